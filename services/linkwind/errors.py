@@ -1,0 +1,87 @@
+"""Every public exception of linkwind.
+
+::
+
+    LinkwindError                    exit code 1
+    ├── InputError                   3   something that the user gave is wrong
+    │   ├── ScenarioError                a scenario file, a key or an override
+    │   ├── MechanismError               bodies and joints that do not make a mechanism
+    │   ├── ExpressionError              a force-field expression
+    │   └── LogError                     a log file that is missing, damaged or foreign
+    ├── ParticipantError             4   a participant ended the run
+    │   ├── RefusedError                 the dynamics refused a participant
+    │   ├── ProtocolError                a message that the lock-step protocol does not allow
+    │   ├── LostError                    a participant died, stopped or never came
+    │   ├── AnswerTimeoutError           a participant is alive but does not answer
+    │   ├── FaultError                   a participant reported that it cannot go on
+    │   └── SimulationError              numerical trouble: NaN, singular inertia, step underflow
+    └── VerificationError            5   two runs that should be equal are not
+
+A message says what, which item, expected, got, and what to do.
+"""
+
+from __future__ import annotations
+
+
+class LinkwindError(Exception):
+    """Base of every exception that linkwind raises on purpose."""
+
+    exit_code = 1
+
+
+class InputError(LinkwindError):
+    """Something that the user gave is wrong."""
+
+    exit_code = 3
+
+
+class ScenarioError(InputError):
+    """A scenario file, one of its keys or an override is wrong."""
+
+
+class MechanismError(InputError):
+    """Bodies and joints that do not make a mechanism."""
+
+
+class ExpressionError(InputError):
+    """A force-field expression cannot be parsed or evaluated."""
+
+
+class LogError(InputError):
+    """A log file is missing, damaged or not one of linkwind's."""
+
+
+class ParticipantError(LinkwindError):
+    """A participant ended the run."""
+
+    exit_code = 4
+
+
+class RefusedError(ParticipantError):
+    """The dynamics refused a participant."""
+
+
+class ProtocolError(ParticipantError):
+    """A message that the lock-step protocol does not allow."""
+
+
+class LostError(ParticipantError):
+    """A participant died, was stopped, or never came."""
+
+
+class AnswerTimeoutError(ParticipantError):
+    """A participant is alive but did not answer in time."""
+
+
+class FaultError(ParticipantError):
+    """A participant reported that it cannot go on."""
+
+
+class SimulationError(ParticipantError):
+    """Numerical trouble: not a number, singular inertia, step-size underflow."""
+
+
+class VerificationError(LinkwindError):
+    """Two runs that should be equal are not."""
+
+    exit_code = 5

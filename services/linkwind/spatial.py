@@ -1,0 +1,88 @@
+"""Motion and force of bodies as arrays, and the rotations between their frames.
+
+Frames and units are the project's: world ``W`` is right-handed; a pose is the position of the centre
+of mass [m] and a unit quaternion ``(w, x, y, z)``, body to world; twist and wrench are in ``W`` at the
+centre of mass.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def address(array: Array) -> int:
+    """Return the memory address of a C-contiguous float64 array, for the native library."""
+    if array.dtype != np.float64 or not array.flags.c_contiguous:
+        raise TypeError(f"expected a C-contiguous float64 array, got {array.dtype} {array.strides}")
+    return int(array.__array_interface__["data"][0])
+
+
+class Motion:
+    """Poses and twists of bodies as four arrays, which may be views into a message.
+
+    Attributes:
+        position: centres of mass [m], shape (n, 3), in W.
+        orientation: unit quaternions (w, x, y, z), body to world, shape (n, 4).
+        linear: velocities of the centres of mass [m/s], shape (n, 3), in W.
+        angular: angular velocities [rad/s], shape (n, 3), in W.
+        addresses: where the four arrays lie in memory, in this order.
+    """
+
+    __slots__ = ("addresses", "angular", "linear", "orientation", "position")
+
+    def __init__(self, position: Array, orientation: Array, linear: Array, angular: Array) -> None:
+        self.position = position
+        self.orientation = orientation
+        self.linear = linear
+        self.angular = angular
+        self.addresses = tuple(map(address, (position, orientation, linear, angular)))
+
+    @classmethod
+    def at_rest(cls, n: int) -> Motion:
+        """Return ``n`` bodies at rest at the origin, in arrays of their own."""
+        orientation = np.zeros((n, 4))
+        orientation[:, 0] = 1.0
+        return cls(np.zeros((n, 3)), orientation, np.zeros((n, 3)), np.zeros((n, 3)))
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+
+class Wrench:
+    """Forces on bodies as arrays, which may be views into a message.
+
+    The wrench on body b is ``(force[b], torque[b]) - rotated(added_inertia[b]) @ (linear acceleration,
+    angular acceleration)``; everything that is proportional to acceleration stays out of force and torque.
+
+    Attributes:
+        force: [N], shape (n, 3), in W at the centre of mass.
+        torque: [N·m], shape (n, 3), in W about the centre of mass.
+        added_inertia: ``A`` [kg, kg·m, kg·m²], shape (n, 6, 6), symmetric positive semi-definite, force
+            rows first, in the **body** frame at the centre of mass, so that it is constant for a rigid
+            shape; None where the provider returns none.
+        addresses: where force, torque and added_inertia lie in memory (0 for None).
+    """
+
+    __slots__ = ("added_inertia", "addresses", "force", "torque")
+
+    def __init__(self, force: Array, torque: Array, added_inertia: Array | None = None) -> None:
+        self.force = force
+        self.torque = torque
+        self.added_inertia = added_inertia
+        self.addresses = (
+            address(force),
+            address(torque),
+            0 if added_inertia is None else address(added_inertia),
+        )
+
+    @classmethod
+    def zeros(cls, n: int, *, added_inertia: bool = False) -> Wrench:
+        """Return zero wrenches on ``n`` bodies, in arrays of their own."""
+        added = np.zeros((n, 6, 6)) if added_inertia else None
+        return cls(np.zeros((n, 3)), np.zeros((n, 3)), added)
+
+    def __len__(self) -> int:
+        return len(self.force)
