@@ -1,0 +1,51 @@
+"""The aero service: a force model that answers motion with wrenches until the run is over."""
+
+from __future__ import annotations
+
+from linkwind import aero
+from linkwind.bus.base import ProviderLink
+from linkwind.errors import FaultError, LostError
+from linkwind.protocol import Model, ProviderSession, ProviderState
+from linkwind.scenario import from_json
+
+GOODBYE_TIMEOUT = 2.0  # s; a dynamics that is gone by then does not need the Bye
+
+
+def session(name: str) -> ProviderSession:
+    """Return the protocol state of the provider ``name``, which takes its scenario from the dynamics."""
+
+    def build(scenario_json: str, provider: str) -> Model:
+        scenario = from_json(scenario_json)
+        return aero.build(scenario, next(p for p in scenario.providers if p.name == provider))
+
+    return ProviderSession(name, build)
+
+
+def serve(link: ProviderLink, provider: ProviderSession, start_timeout: float) -> None:
+    """Take part in one run.
+
+    Args:
+        link: an open end of the bus.
+        provider: protocol state, new.
+        start_timeout: [s] to wait for the dynamics.
+
+    Raises:
+        RefusedError: the dynamics refuses this provider.
+        LostError: no dynamics came, or it went away in the middle of the run.
+        FaultError: somebody else ended the run.
+        SimulationError: the force model failed (the dynamics has been told).
+    """
+    provider.welcome(link.request(provider.hello(), start_timeout))
+    try:
+        provider.build()
+        link.join(provider.run, provider.name)
+        provider.started(link.request(provider.ready(), start_timeout))
+        while provider.state is not ProviderState.DONE:
+            answer = provider.answer(link.receive())
+            if answer is not None:
+                link.reply(answer)
+    except Exception as error:
+        if not isinstance(error, LostError | FaultError):
+            link.request(provider.fault(error), GOODBYE_TIMEOUT)
+        raise
+    link.request(provider.bye(), GOODBYE_TIMEOUT)

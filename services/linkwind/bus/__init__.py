@@ -1,0 +1,1 @@
+"""Transports: each moves ``(key, bytes)`` between the dynamics and its providers."""

@@ -1,0 +1,85 @@
+"""What a transport has to offer: the two ends of the bus.
+
+A transport moves ``(key, bytes)`` and tells who is there; it knows no message but Fault. Keys are
+``linkwind/v1/<run>/motion``, ``…/wrench/<provider>``, ``…/control``, ``…/fault`` and
+``…/alive/<participant>``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+PREFIX = "linkwind/v1"
+
+
+class DynamicsLink(Protocol):
+    """The dynamics' end: providers come to it."""
+
+    def wait(self, done: Callable[[], bool], timeout: float, poll: Callable[[], None]) -> bool:
+        """Wait until ``done`` holds, which control requests bring about.
+
+        Args:
+            done: is asked after each control request.
+            timeout: [s] of wall clock.
+            poll: is called now and then; may raise to give up.
+
+        Returns:
+            whether ``done`` holds.
+        """
+        ...
+
+    def post(self, motion: bytes) -> None:
+        """Send a motion message to every provider."""
+        ...
+
+    def receive(self) -> tuple[str, bytes]:
+        """Return the next wrench message and the provider that it came from.
+
+        Raises:
+            LostError: a provider died or was stopped.
+            AnswerTimeoutError: a provider is alive but has not answered in time.
+            FaultError: a provider reported that it cannot go on.
+        """
+        ...
+
+    def fault(self, payload: bytes) -> None:
+        """Tell every provider that the run is over, and why."""
+        ...
+
+    def close(self) -> None:
+        """Leave the bus."""
+        ...
+
+
+class ProviderLink(Protocol):
+    """A provider's end: it goes to the dynamics."""
+
+    def request(self, payload: bytes, timeout: float) -> bytes:
+        """Send a control request and return the answer, trying until ``timeout`` [s] is over.
+
+        Raises:
+            LostError: nobody answered.
+        """
+        ...
+
+    def join(self, run: str, name: str) -> None:
+        """Take part in ``run``: from now on motion messages come in."""
+        ...
+
+    def receive(self) -> bytes:
+        """Return the next motion message.
+
+        Raises:
+            LostError: the dynamics died or was stopped.
+            FaultError: a participant reported that it cannot go on.
+        """
+        ...
+
+    def reply(self, wrench: bytes) -> None:
+        """Send a wrench message to the dynamics."""
+        ...
+
+    def close(self) -> None:
+        """Leave the bus."""
+        ...

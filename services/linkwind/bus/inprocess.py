@@ -1,0 +1,53 @@
+"""Both sides in one process: the same messages, handed over by calling."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+
+from linkwind.errors import LinkwindError
+from linkwind.protocol import DynamicsSession, ProviderSession, fault_error
+
+
+class InProcessLink:
+    """The dynamics' end of a bus whose providers live in the same thread."""
+
+    def __init__(self, session: DynamicsSession, providers: Sequence[ProviderSession]) -> None:
+        """Shake hands with every provider.
+
+        Raises:
+            LinkwindError: a provider is refused or cannot build its model.
+        """
+        self._session = session
+        self._providers = list(providers)
+        self._answers: deque[tuple[str, bytes]] = deque()
+        for provider in self._providers:
+            provider.welcome(session.control(provider.hello()))
+            provider.build()
+            provider.started(session.control(provider.ready()))
+
+    def wait(self, done: Callable[[], bool], timeout: float, poll: Callable[[], None]) -> bool:
+        """Everything has been said by the time that this is called."""
+        return done()
+
+    def post(self, motion: bytes) -> None:
+        """Let every provider answer."""
+        for provider in self._providers:
+            try:
+                answer = provider.answer(motion)
+            except LinkwindError as error:
+                raise fault_error(provider.fault(error)) from error
+            if answer is None:
+                self._session.control(provider.bye())
+            else:
+                self._answers.append((provider.name, answer))
+
+    def receive(self) -> tuple[str, bytes]:
+        """Return the next answer."""
+        return self._answers.popleft()
+
+    def fault(self, payload: bytes) -> None:
+        """Nobody is left to be told."""
+
+    def close(self) -> None:
+        """Nothing is open."""
