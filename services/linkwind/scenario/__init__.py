@@ -1,0 +1,34 @@
+"""Scenarios: TOML files and built-ins, parsed once into frozen, validated models.
+
+>>> scenario = load("two_link", ["coupling.step=5e-4"])
+>>> scenario.coupling.step_ns
+500000
+"""
+
+from linkwind.scenario.bodies import Body, Joint, Plate
+from linkwind.scenario.loading import builtin_names, from_json, load, loads, template
+from linkwind.scenario.model import Scenario
+from linkwind.scenario.providers import FieldExpressions, PlateModel, Provider
+from linkwind.scenario.settings import Bus, Coupling, Dynamics, Environment, Gust, Log, Time
+
+__all__ = [
+    "Body",
+    "Bus",
+    "Coupling",
+    "Dynamics",
+    "Environment",
+    "FieldExpressions",
+    "Gust",
+    "Joint",
+    "Log",
+    "Plate",
+    "PlateModel",
+    "Provider",
+    "Scenario",
+    "Time",
+    "builtin_names",
+    "from_json",
+    "load",
+    "loads",
+    "template",
+]

@@ -1,0 +1,136 @@
+"""What the tables of a scenario must agree on: names, topology, steps, what a model needs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from decimal import Decimal
+from typing import TYPE_CHECKING
+
+from linkwind.scenario.problems import Path, Problem, choice, show
+from linkwind.scenario.settings import nanoseconds
+
+if TYPE_CHECKING:
+    from linkwind.scenario.model import Scenario
+    from linkwind.scenario.providers import Provider
+
+
+def disagreements(scenario: Scenario) -> list[Problem]:
+    """Return everything that does not fit together, in the order of the file."""
+    problems = [*_end(scenario), *_names(scenario), *_inertias(scenario), *_joints(scenario)]
+    for index, provider in enumerate(scenario.providers):
+        problems += _provider(scenario, provider, ("providers", index))
+    return problems + list(_masses(scenario))
+
+
+def _end(scenario: Scenario) -> Iterator[Problem]:
+    end, step = nanoseconds(scenario.time.end), nanoseconds(scenario.coupling.step)
+    if end % step:
+        below = end // step * step
+        use = [f"{float(ns / 10**9)!r}" for ns in (below, below + step) if ns > Decimal(0)]
+        expected = f"a multiple of coupling.step = {scenario.coupling.step!r} s"
+        yield Problem(("time", "end"), expected, show(scenario.time.end), f"Use {' or '.join(use)}.")
+
+
+def _names(scenario: Scenario) -> Iterator[Problem]:
+    tables = {
+        "bodies": [body.name for body in scenario.bodies],
+        "joints": [joint.name for joint in scenario.joints],
+        "providers": [provider.name for provider in scenario.providers],
+    }
+    for table, names in tables.items():
+        for index, name in enumerate(names):
+            if name in names[:index]:
+                expected = f"a name of its own ({table}[{names.index(name)}] has it)"
+                yield Problem((table, index, "name"), expected, show(name), "Rename one of the two.")
+
+
+def _inertias(scenario: Scenario) -> Iterator[Problem]:
+    spatial = next((body.name for body in scenario.bodies if not body.planar), None)
+    if spatial is None:
+        return
+    for index, body in enumerate(scenario.bodies):
+        if body.planar:
+            expected = f"6 numbers, because {spatial} is 3-D"
+            advice = "Give [Ixx, Iyy, Izz, Ixy, Ixz, Iyz]."
+            yield Problem(("bodies", index, "inertia"), expected, show(body.inertia), advice)
+
+
+def _joints(scenario: Scenario) -> Iterator[Problem]:
+    bodies = [body.name for body in scenario.bodies]
+    parents: dict[str, str] = {}
+    by_child: dict[str, str] = {}
+    for index, joint in enumerate(scenario.joints):
+        path: Path = ("joints", index)
+        unknown = False
+        for key, word, known in (
+            ("parent", joint.parent, [*bodies, "world"]),
+            ("child", joint.child, bodies),
+        ):
+            if word not in known:
+                unknown = True
+                yield choice((*path, key), "one of the bodies", known, word)
+        if unknown:
+            continue
+        if joint.parent == joint.child:
+            advice = "Name the body that carries it, or world."
+            yield Problem((*path, "parent"), "another body than the child", show(joint.parent), advice)
+        elif joint.child in by_child:
+            expected = f"a body without a parent joint ({by_child[joint.child]} is the one of {joint.child})"
+            advice = "Swap parent and child, or remove a joint: loops are not supported."
+            yield Problem((*path, "child"), expected, show(joint.child), advice)
+        else:
+            by_child[joint.child] = joint.name
+            parents[joint.child] = joint.parent
+            cycle = _cycle(joint.child, parents)
+            if cycle:
+                expected = "joints that form a tree"
+                advice = "Remove a joint: loops are not supported."
+                yield Problem((*path, "parent"), expected, "the loop " + " → ".join(cycle), advice)
+                del parents[joint.child]  # reported once
+
+
+def _cycle(body: str, parents: dict[str, str]) -> list[str]:
+    """Return the bodies from ``body`` up to itself, or nothing where the way up ends."""
+    way = [body]
+    while way[-1] in parents:
+        way.append(parents[way[-1]])
+        if way[-1] == body:
+            return way
+    return []
+
+
+def _provider(scenario: Scenario, provider: Provider, path: Path) -> Iterator[Problem]:
+    bodies = [body.name for body in scenario.bodies]
+    for index, name in enumerate(provider.bodies):
+        if name not in bodies:
+            yield choice((*path, "bodies", index), "one of the bodies", bodies, name)
+        elif name in provider.bodies[:index]:
+            expected = "each body once"
+            yield Problem((*path, "bodies", index), expected, show(name), "Remove one of the two.")
+    for name in provider.field:
+        if name not in provider.bodies:
+            yield choice((*path, "field", name), "one of its bodies", provider.bodies, name)
+    if provider.model == "field" and not provider.field:
+        expected = "a table for at least one body"
+        advice = f'Add [{_first(provider.bodies)}] fx = "…" below it.'
+        yield Problem((*path, "field"), expected, "nothing", advice)
+    if provider.model == "plate":
+        for index, body in enumerate(scenario.bodies):
+            if body.name in provider.bodies and body.shape is None:
+                expected = f'a plate, which the model of provider "{provider.name}" needs'
+                advice = 'Add shape = { type = "plate", length = … }.'
+                yield Problem(("bodies", index, "shape"), expected, "nothing", advice)
+
+
+def _first(names: Sequence[str]) -> str:
+    return names[0] if names else "body"
+
+
+def _masses(scenario: Scenario) -> Iterator[Problem]:
+    """A body without mass moves only if a model adds inertia to it."""
+    carried = {name for entry in scenario.providers if entry.model == "plate" for name in entry.bodies}
+    for index, body in enumerate(scenario.bodies):
+        if body.mass == 0.0 and body.name not in carried:
+            expected = "a number above 0 [kg], because no provider adds inertia to this body"
+            advice = "Give it a mass, or the model plate."
+            yield Problem(("bodies", index, "mass"), expected, show(body.mass), advice)

@@ -1,0 +1,117 @@
+"""From a file, a built-in name or JSON to a validated scenario."""
+
+from __future__ import annotations
+
+import copy
+import json
+import tomllib
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, NoReturn
+
+from pydantic import ValidationError
+
+from linkwind.errors import ScenarioError
+from linkwind.scenario import translation
+from linkwind.scenario.model import Scenario
+from linkwind.scenario.overrides import override
+from linkwind.scenario.problems import Problem, ProblemError, nearest
+from linkwind.scenario.shorthand import Source, expand
+
+SHOWN = 5  # problems that one error reports, a line each
+
+_PACKAGE = files("linkwind.scenario")
+
+
+def builtin_names() -> list[str]:
+    """Return the names of the scenarios that come with linkwind."""
+    library = _PACKAGE.joinpath("library").iterdir()
+    return sorted(entry.name.removesuffix(".toml") for entry in library if entry.name.endswith(".toml"))
+
+
+def load(source: str | Path, overrides: Sequence[str] = ()) -> Scenario:
+    """Return the scenario of a TOML file or of a built-in name.
+
+    Args:
+        source: path of a file, or the name of a built-in; a built-in goes before a file without suffix.
+        overrides: ``KEY=VALUE`` arguments, see ``overrides.override``.
+
+    Raises:
+        ScenarioError: there is no such file or name, or something in it is wrong; one line a problem.
+    """
+    if isinstance(source, str) and source in builtin_names():
+        text = _PACKAGE.joinpath("library", f"{source}.toml").read_text(encoding="utf-8")
+        return loads(text, f"{source}.toml", overrides)
+    path = Path(source)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise ScenarioError(
+            f"{path}: expected text in UTF-8; got a wrong byte at position {error.start}. Save it as UTF-8."
+        ) from None
+    except (OSError, ValueError) as error:  # ValueError: a null byte in the path
+        near = nearest(str(source), builtin_names())
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        advice = f'Use "{near}".' if near else "Check the path."
+        raise ScenarioError(
+            f"{source}: expected a file or one of {', '.join(builtin_names())}; got: {reason}. {advice}"
+        ) from None
+    return loads(text, str(path), overrides)
+
+
+def loads(text: str, name: str, overrides: Sequence[str] = ()) -> Scenario:
+    """Return the scenario of a TOML text; ``name`` is what errors call it, with or without a path.
+
+    Raises:
+        ScenarioError: something in it is wrong; one line a problem.
+    """
+    try:
+        data = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ScenarioError(f"{name}: expected valid TOML; got: {error}. Correct it.") from None
+    return _scenario(data, name, overrides)
+
+
+def from_json(text: str, name: str = "scenario.json") -> Scenario:
+    """Return the scenario that ``Scenario.to_json`` wrote, equal to the original.
+
+    Raises:
+        ScenarioError: this is not JSON, or something in it is wrong; one line a problem.
+    """
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ScenarioError(f"{name}: expected valid JSON; got: {error}. Correct it.") from None
+    if not isinstance(data, dict):
+        raise ScenarioError(f"{name}: expected an object; got {type(data).__name__}. Correct it.")
+    return _scenario(data, name, ())
+
+
+def template() -> str:
+    """Return the commented scenario that ``linkwind init`` writes: every key, its unit and default."""
+    return _PACKAGE.joinpath("template.toml").read_text(encoding="utf-8")
+
+
+def _scenario(data: dict[str, Any], name: str, overrides: Sequence[str]) -> Scenario:
+    source = Source(name, shorthand=False, overridden={})
+    try:
+        data, shorthand = expand(copy.deepcopy(data), Path(name).stem)
+        source = Source(name, shorthand, {})
+        for argument in overrides:
+            try:
+                source.overridden[override(data, argument)] = argument
+            except ProblemError as error:
+                _refuse(error.problems, Source(f"--set {argument}", shorthand, {}))
+        return Scenario.model_validate(data)
+    except ProblemError as error:
+        _refuse(error.problems, source)
+    except ValidationError as error:
+        _refuse(translation.problems(error, Scenario), source)
+
+
+def _refuse(problems: Sequence[Problem], source: Source) -> NoReturn:
+    lines = [source.line(problem) for problem in problems[:SHOWN]]
+    if len(problems) > SHOWN:
+        lines.append(f"{source.file}: and {len(problems) - SHOWN} more")
+    raise ScenarioError("\n".join(lines)) from None

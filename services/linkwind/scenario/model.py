@@ -1,0 +1,76 @@
+"""The scenario as a whole: its tables, and what they must agree on."""
+
+from __future__ import annotations
+
+import json
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from linkwind.scenario.agreement import disagreements
+from linkwind.scenario.bodies import Body, Joint
+from linkwind.scenario.problems import ProblemError
+from linkwind.scenario.providers import Provider
+from linkwind.scenario.quantities import Section
+from linkwind.scenario.settings import Bus, Coupling, Dynamics, Environment, Log, Time, nanoseconds
+
+
+class Scenario(Section):
+    """Everything that a run needs, and a provider with it: no file paths.
+
+    Made by ``load``, ``loads`` and ``from_json``, which fill in defaults and report errors in terms of
+    the file. Providers carry the explicit names of their bodies.
+    """
+
+    name: str = Field(
+        pattern=r"^\w[\w.-]*$", max_length=128, description="Name of the scenario; default: the file's"
+    )
+    description: str = Field(default="", description="What the scenario is about, in a line or two")
+    time: Time = Field(description="Simulation time")
+    environment: Environment = Field(default=Environment(), description="What surrounds the mechanism")
+    bodies: tuple[Body, ...] = Field(strict=False, min_length=1, description="The rigid bodies")
+    joints: tuple[Joint, ...] = Field(default=(), strict=False, description="The joints between them")
+    providers: tuple[Provider, ...] = Field(
+        strict=False, min_length=1, description="The force providers; [aero] is short for one named aero"
+    )
+    dynamics: Dynamics = Field(default=Dynamics(), description="How the mechanism is advanced")
+    coupling: Coupling = Field(default=Coupling(), description="When motion and wrench are exchanged")
+    bus: Bus = Field(default=Bus(), description="How messages travel")
+    log: Log = Field(default=Log(), description="What is logged")
+
+    @field_validator("providers")
+    @classmethod
+    def _all_bodies_by_default(
+        cls, providers: tuple[Provider, ...], info: ValidationInfo
+    ) -> tuple[Provider, ...]:
+        names = tuple(body.name for body in info.data.get("bodies", ()))
+        return tuple(
+            provider if provider.bodies else provider.model_copy(update={"bodies": names})
+            for provider in providers
+        )
+
+    @model_validator(mode="after")
+    def _agree(self) -> Scenario:
+        problems = disagreements(self)
+        if problems:
+            raise ProblemError(problems)
+        return self
+
+    @property
+    def end_ns(self) -> int:
+        """End of the run [ns]."""
+        return int(nanoseconds(self.time.end))
+
+    @property
+    def steps(self) -> int:
+        """Number of communication steps."""
+        return self.end_ns // self.coupling.step_ns
+
+    @property
+    def planar(self) -> bool:
+        """Whether the mechanism moves in the x, y plane: every inertia is a single number."""
+        return all(body.planar for body in self.bodies)
+
+    def to_json(self) -> str:
+        """Return canonical JSON: keys sorted, floats exact; ``from_json`` gives an equal scenario."""
+        data = self.model_dump(mode="json", exclude_none=True)
+        return json.dumps(data, sort_keys=True, ensure_ascii=False, allow_nan=False, separators=(",", ":"))

@@ -1,0 +1,111 @@
+"""How a scenario is computed: time, surroundings, dynamics, coupling, bus and log."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+from typing import Literal
+
+from pydantic import Field, field_validator
+
+from linkwind.scenario.problems import ProblemError
+from linkwind.scenario.quantities import Section, Vector, quantity
+
+Method = Literal["reduced"]
+IntegratorName = Literal["euler", "semi_implicit_euler", "rk4", "dopri5"]
+Scheme = Literal["explicit", "pec"]
+UseAffine = Literal["auto", "never"]
+Transport = Literal["zenoh", "inprocess"]
+
+ZERO = (0.0, 0.0, 0.0)
+
+
+def nanoseconds(seconds: float) -> Decimal:
+    """Return a time in ns, from the decimal digits that the user wrote: 0.1 s is exactly 10⁸ ns."""
+    return Decimal(repr(seconds)) * 1_000_000_000
+
+
+class Time(Section):
+    """Simulation time, from 0 to end."""
+
+    end: float = quantity("End of the run, a multiple of coupling.step", "s", gt=0.0, le=1e9)
+
+
+class Gust(Section):
+    """A travelling wave on top of the wind: amplitude · sin(2π(frequency·t + wavenumber·r) + phase)."""
+
+    amplitude: Vector = quantity("Amplitude of the wind's change", "m/s")
+    frequency: float = quantity("Frequency at a fixed place", "Hz")
+    wavenumber: Vector = quantity("Cycles per metre along x, y, z", "1/m", ZERO)
+    phase_deg: float = quantity("Phase at t = 0 at the origin", "deg", 0.0)
+
+
+class Environment(Section):
+    """What surrounds the mechanism."""
+
+    gravity: Vector = quantity("Acceleration of gravity, in the world", "m/s²", (0.0, -9.81, 0.0))
+    density: float = quantity("Density of the fluid", "kg/m³", 1.225, ge=0.0)
+    wind: Vector = quantity("Velocity of the undisturbed fluid, in the world", "m/s", ZERO)
+    gusts: tuple[Gust, ...] = Field(
+        default=(), strict=False, description="Waves that travel through the wind"
+    )
+
+
+class Dynamics(Section):
+    """How the mechanism is advanced over a communication step."""
+
+    method: Method = Field(default="reduced", description="Formulation: reduced, in joint coordinates")
+    integrator: IntegratorName = Field(default="rk4", description="Integrator")
+    substeps: int = Field(
+        default=1, ge=1, description="Integrator steps in a communication step (not for dopri5)"
+    )
+    rtol: float = quantity("Relative tolerance of dopri5", "1", 1e-9, gt=0.0)
+    atol: float = quantity("Absolute tolerance of dopri5", "m, rad, m/s, rad/s", 1e-12, gt=0.0)
+
+
+class Coupling(Section):
+    """When motion and wrench are exchanged, and what happens in between."""
+
+    scheme: Scheme = Field(
+        default="pec",
+        description="explicit: the wrench is held over the step; pec: predicted, evaluated, corrected",
+    )
+    order: int = Field(default=3, ge=0, le=3, description="Degree of the extrapolated wrench (pec)")
+    adaptive: bool = Field(default=True, description="Lower the order where the wrench is not smooth (pec)")
+    step: float = quantity("Communication step size, a whole number of nanoseconds", "s", 1e-3, gt=0.0)
+    timeout: float = quantity(
+        "Wait this long for an answer from a participant that is alive", "s", 2.0, gt=0.0
+    )
+    use_affine: UseAffine = Field(
+        default="auto", description="Use the added inertia that a provider returns, or never"
+    )
+
+    @field_validator("step")
+    @classmethod
+    def _whole_nanoseconds(cls, step: float) -> float:
+        ns = nanoseconds(step)
+        if ns % 1:
+            near = max(1, round(ns))
+            raise ProblemError.value(
+                "a whole number of nanoseconds", step, f"Use {float(Decimal(near) / 10**9)!r}."
+            )
+        return step
+
+    @property
+    def step_ns(self) -> int:
+        """Communication step size [ns]."""
+        return int(nanoseconds(self.step))
+
+
+class Bus(Section):
+    """How messages travel."""
+
+    transport: Transport = Field(
+        default="zenoh", description="zenoh: separate processes; inprocess: everything in one process"
+    )
+    start_timeout: float = quantity("Wait this long for every participant to be ready", "s", 60.0, gt=0.0)
+
+
+class Log(Section):
+    """What is written besides the exchanged messages."""
+
+    checkpoint_every: int = Field(default=0, ge=0, description="Steps between checkpoints [1]; 0: none")

@@ -1,0 +1,67 @@
+"""What a file may leave out or write shorter: its name, and ``[aero]`` for one provider named aero."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from typing import Any
+
+from linkwind.scenario.problems import Path, Problem, ProblemError, show
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a scenario comes from, to name its parts in errors the way the user wrote them.
+
+    Attributes:
+        file: what an error starts with.
+        shorthand: whether ``providers[0]`` was written as ``[aero]``, or left out.
+        overridden: ``--set`` arguments by the path that they set.
+    """
+
+    file: str
+    shorthand: bool
+    overridden: dict[Path, str]
+
+    def written(self, path: Path) -> Path:
+        """Return the path as it stands in the file."""
+        if self.shorthand and len(path) > 1 and path[0] == "providers" and isinstance(path[1], int):
+            return ("aero", *path[2:]) if path[1] == 0 else ("providers", path[1] - 1, *path[2:])
+        return path
+
+    def line(self, problem: Problem) -> str:
+        """Return the problem as one line, with the file or the override that it comes from."""
+        origin = self.file
+        for length in range(len(problem.path), 0, -1):
+            if problem.path[:length] in self.overridden:
+                origin = f"--set {self.overridden[problem.path[:length]]}"
+                break
+        return f"{origin}: {replace(problem, path=self.written(problem.path)).line()}"
+
+
+def expand(data: dict[str, Any], stem: str) -> tuple[dict[str, Any], bool]:
+    """Return the data with name and providers written out, and whether providers[0] is ``[aero]``.
+
+    A scenario without any provider gets one that exerts no force, so that every run has one.
+
+    Raises:
+        ProblemError: ``[aero]`` cannot become an entry of providers.
+    """
+    data = dict(data)
+    data.setdefault("name", re.sub(r"^[^\w]|[^\w.-]", "_", stem) or "scenario")
+    providers = data.get("providers", [])
+    if not isinstance(providers, list):
+        problem = Problem(("providers",), "a list of tables", show(providers), "Write [[providers]].")
+        raise ProblemError([problem])
+    if "aero" not in data and providers:
+        return data, False
+    aero = data.pop("aero", {"model": "none"})
+    if isinstance(aero, dict):
+        if "name" in aero:
+            advice = "Remove it, or write [[providers]]."
+            raise ProblemError(
+                [Problem(("aero", "name"), "no name besides aero", show(aero["name"]), advice)]
+            )
+        aero = {"name": "aero", **aero}
+    data["providers"] = [aero, *providers]
+    return data, True

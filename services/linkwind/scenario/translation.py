@@ -1,0 +1,130 @@
+"""Pydantic's errors in the scenario's words: item, expected, got, what to do."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
+
+from linkwind.scenario.problems import Path, Problem, ProblemError, choice, nearest, show
+
+_KINDS = {
+    "float_type": "a number",
+    "finite_number": "a finite number",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "int_parsing_size": "a smaller whole number",
+    "bool_type": "true or false",
+    "string_type": "text in quotes",
+    "string_too_long": "a shorter text",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "dict_type": "a table",
+    "tuple_type": "a list",
+}
+_LIMITS = {
+    "greater_than": ("above", "gt"),
+    "greater_than_equal": ("of at least", "ge"),
+    "less_than_equal": ("of at most", "le"),
+}
+
+
+def problems(error: ValidationError, model: type[BaseModel]) -> list[Problem]:
+    """Return what pydantic found wrong with the data of ``model``, in its order."""
+    found: list[Problem] = []
+    for detail in error.errors(include_url=False):
+        path: Path = detail["loc"]
+        cause = detail.get("ctx", {}).get("error")
+        if isinstance(cause, ProblemError):
+            found += [problem.below(path) for problem in cause.problems]
+        else:
+            found.append(_problem(detail, path, model))
+    return found
+
+
+def _problem(detail: ErrorDetails, path: Path, model: type[BaseModel]) -> Problem:
+    kind, got = detail["type"], show(detail["input"])
+    field = _field(model, path)
+    unit = _unit(field)
+    if kind == "extra_forbidden":
+        return _unknown_key(path, model)
+    if kind == "missing":
+        described = field.description if field else None
+        return Problem(path, f"{described or 'a value'}", "nothing", f"Add {path[-1]}.")
+    if kind == "literal_error":
+        words = re.findall(r"'([^']*)'", str(detail["ctx"]["expected"]))
+        return choice(path, "one of", words, detail["input"])
+    if kind in _LIMITS:
+        words_of, key = _LIMITS[kind]
+        limit = detail["ctx"][key]
+        return Problem(path, f"a number {words_of} {limit:g}{unit}", got, "Change the value.")
+    if kind in ("too_short", "too_long"):
+        return Problem(path, "at least one entry", got, "Add an entry, or leave the key out.")
+    if kind == "string_pattern_mismatch":
+        advice = "Start with a letter; go on with letters, digits and _."
+        return Problem(path, "a name", got, advice)
+    if kind in _KINDS:
+        return Problem(path, _KINDS[kind] + unit, got, _advice(kind, detail["input"], unit))
+    return Problem(path, f"a valid value ({detail['msg']})", got, "Change the value.")
+
+
+def _advice(kind: str, value: Any, unit: str) -> str:
+    if kind in ("float_type", "int_type") and isinstance(value, str):
+        return "Write the number alone, without quotes" + (" and unit." if unit else ".")
+    examples = {
+        "bool_type": "Write true or false, without quotes.",
+        "string_type": 'Write it as "…".',
+        "model_type": "Write it as [table] or { key = value }.",
+        "dict_type": "Write it as [table] or { key = value }.",
+        "tuple_type": "Write it as [[table]] or [a, b].",
+    }
+    return examples.get(kind, "Change the value.")
+
+
+def _unknown_key(path: Path, model: type[BaseModel]) -> Problem:
+    owner = _model(model, path[:-1]) or model
+    keys, word = list(owner.model_fields), str(path[-1])
+    near = nearest(word, keys)
+    advice = f'Use "{near}".' if near else "Remove it."
+    return Problem(path, f"a key among {', '.join(keys)}", show(word), advice)
+
+
+def _unit(field: FieldInfo | None) -> str:
+    extra: Mapping[str, Any] | Callable[..., None] | None = field.json_schema_extra if field else None
+    unit = extra.get("unit") if isinstance(extra, Mapping) else None
+    return f" [{unit}]" if unit else ""
+
+
+def _field(model: type[BaseModel], path: Path) -> FieldInfo | None:
+    """Return the field that a path ends in, or None where it ends in an entry of a list or table."""
+    owner = _model(model, path[:-1])
+    return owner.model_fields.get(str(path[-1])) if owner and path else None
+
+
+def _model(model: type[BaseModel], path: Path) -> type[BaseModel] | None:
+    """Return the model of the table at a path."""
+    current: type[BaseModel] | None = model
+    annotation: Any = model
+    for part in path:
+        if isinstance(part, str) and current is not None and part in current.model_fields:
+            annotation = current.model_fields[part].annotation
+            current = _plain(annotation)
+        else:  # an index into a list, or a name in a table of tables
+            current = _nested(annotation)
+    return current
+
+
+def _plain(annotation: Any) -> type[BaseModel] | None:
+    """Return the model that an annotation is, or is besides None."""
+    options = [annotation, *get_args(annotation)] if type(None) in get_args(annotation) else [annotation]
+    return next((part for part in options if isinstance(part, type) and issubclass(part, BaseModel)), None)
+
+
+def _nested(annotation: Any) -> type[BaseModel] | None:
+    """Return the model that an annotation is a list or a table of."""
+    parts = get_args(annotation)
+    return next((part for part in parts if isinstance(part, type) and issubclass(part, BaseModel)), None)
