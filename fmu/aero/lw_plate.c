@@ -1,0 +1,124 @@
+#include "lw_plate.h"
+
+#include <string.h>
+
+static const double pi = 3.14159265358979323846264338327950;
+static const double degree = 0.01745329251994329576923690768489;
+
+/* Coefficients of Li, Goodwill, Wang & Ristroph 2022. */
+static const double C_L1 = 5.2, C_L2 = 0.95, C_D0 = 0.1, C_D1 = 5.0, C_D2 = 1.9, C_R = 1.1;
+/* Coefficients of Andersen, Pesavento & Wang 2005. */
+static const double A_CT = 1.2, A_CR = 3.14159265358979323846264338327950, A_A = 1.4, A_B = 1.0;
+static const double A_MU = 0.2, A_NU = 0.2;
+
+/* Force along the plate and along its normal, and torque about its span axis. */
+typedef struct { double x, y, torque; } planar_wrench;
+
+/* Motion of the section relative to the air: u along the plate, w along the normal, omega about z. */
+typedef struct { double u, w, speed, omega; } section_motion;
+
+static double sign(double x) { return (double)((x > 0.0) - (x < 0.0)); }
+
+/* Lift and drag blended from attached to stalled flow, acting at a centre of pressure that moves;
+ * rotational lift at the centre; rotational drag in closed form: the local drag 1/2 rho C_D2 |omega x|
+ * omega x integrated along the chord has no resultant and the moment rho s C_D2 c^4 |omega| omega / 64. */
+static planar_wrench ristroph(double density, double chord, double span, section_motion m) {
+    const double q = 0.5 * density * chord * span;
+    planar_wrench out = {0.0, 0.0, -q * C_D2 * chord * chord * chord * fabs(m.omega) * m.omega / 32.0};
+    if (m.speed == 0.0) {
+        return out;
+    }
+    const double alpha = atan2(fabs(m.w), fabs(m.u));
+    const double sine = fabs(m.w) / m.speed, cosine = fabs(m.u) / m.speed;
+    const double f = 0.5 * (1.0 - tanh((alpha - 14.0 * degree) / (6.0 * degree)));
+    const double lift = f * C_L1 * sine + (1.0 - f) * C_L2 * 2.0 * sine * cosine;
+    const double drag = f * (C_D0 + C_D1 * sine * sine) + (1.0 - f) * C_D2 * sine * sine;
+    const double ahead = f * (0.3 - 3.5 * alpha * alpha) + (1.0 - f) * 0.2 * (1.0 - 2.0 * alpha / pi);
+    const double l = -q * lift * m.speed * sign(m.u) * sign(m.w), d = q * drag * m.speed;
+    const double r = q * chord * C_R * m.omega;
+    const double normal = l * m.u - d * m.w; /* at the centre of pressure */
+    out.x = -l * m.w - d * m.u - r * m.w;
+    out.y = normal + r * m.u;
+    out.torque += ahead * chord * sign(m.u) * normal;
+    return out;
+}
+
+/* Circulation with a translational and a rotational part, quadratic drag, and a torque against the
+ * rotation. Its steady term mu is scaled with the speed relative to the air, where the source has the
+ * constant speed of the fall. */
+static planar_wrench andersen(double density, double chord, double span, section_motion m) {
+    const double a = 0.5 * chord, a2 = a * a;
+    planar_wrench out = {0.0, 0.0, 0.0};
+    out.torque = -pi * density * span * a2 * a2 * (A_MU * m.speed / a + A_NU * fabs(m.omega)) * m.omega;
+    if (m.speed == 0.0) {
+        return out;
+    }
+    const double u2 = m.u * m.u, w2 = m.w * m.w;
+    const double circulation = -2.0 * A_CT * a * m.u * m.w / m.speed + 2.0 * A_CR * a2 * m.omega;
+    const double l = density * span * circulation;
+    const double d = density * span * a * (A_A - A_B * (u2 - w2) / (u2 + w2)) * m.speed;
+    out.x = -l * m.w - d * m.u;
+    out.y = l * m.u - d * m.w;
+    return out;
+}
+
+/* Kirchhoff's equations for the added momentum p = m_n w n and angular momentum I_a omega_z e_z, less the
+ * terms in the body's own acceleration: force -dp/dt, torque -d(I_a omega_z e_z)/dt - v x p. */
+static void add_added_mass(double mass, double inertia, lw_vec3 v, lw_vec3 omega, double air_rate,
+                           lw_vec3 *force, lw_vec3 *torque) {
+    const double p = mass * v.y;
+    const lw_vec3 turn = lw_vec(-omega.z, 0.0, omega.x); /* omega x n */
+    *force = lw_sub(*force, lw_scale(p, turn));
+    force->y += mass * (air_rate - lw_dot(v, turn));
+    torque->x += v.z * p - inertia * omega.z * omega.y;
+    torque->y += inertia * omega.z * omega.x;
+    torque->z -= v.x * p;
+}
+
+static int evaluate(const lw_plates *plates, int i, double t, const lw_motion *motion, double *force,
+                    double *torque) {
+    const int32_t b = plates->body[i];
+    const double chord = plates->size[2 * i], span = plates->size[2 * i + 1];
+    const lw_mat3 rotation = lw_quat_matrix(lw_load4(motion->orientation + 4 * b));
+    const lw_vec3 velocity = lw_load3(motion->linear + 3 * b);
+    const lw_wind_sample air = lw_wind_at(&plates->wind, t, lw_load3(motion->position + 3 * b), velocity);
+    const lw_vec3 v = lw_mat_tvec(rotation, lw_sub(velocity, air.velocity));
+    const lw_vec3 omega = lw_mat_tvec(rotation, lw_load3(motion->angular + 3 * b));
+    const section_motion section = {v.x, v.y, sqrt(v.x * v.x + v.y * v.y), omega.z};
+    const planar_wrench planar = plates->coefficients == LW_PLATE_ANDERSEN
+                                     ? andersen(plates->density, chord, span, section)
+                                     : ristroph(plates->density, chord, span, section);
+    lw_vec3 f = lw_vec(planar.x, planar.y, 0.0), m = lw_vec(0.0, 0.0, planar.torque);
+    const lw_added_mass added = lw_plate_added_mass(plates->density, chord, span);
+    add_added_mass(added.normal, added.span, v, omega, lw_mat_tvec(rotation, air.rate).y, &f, &m);
+    f = lw_mat_vec(rotation, f);
+    m = lw_mat_vec(rotation, m);
+    lw_store3(force, f);
+    lw_store3(torque, m);
+    return isfinite(f.x + f.y + f.z + m.x + m.y + m.z);
+}
+
+lw_added_mass lw_plate_added_mass(double density, double chord, double span) {
+    const double a2 = 0.25 * chord * chord, mass = pi * density * a2 * span;
+    const lw_added_mass added = {mass, mass * a2 / 8.0};
+    return added;
+}
+
+int lw_plates_evaluate(const lw_plates *plates, double t, const lw_motion *motion,
+                       const lw_wrench *wrench) {
+    int status = 0;
+    for (int i = 0; i < plates->n; ++i) {
+        if (!evaluate(plates, i, t, motion, wrench->force + 3 * i, wrench->torque + 3 * i) && !status) {
+            status = 1 + i;
+        }
+        if (wrench->added_inertia) {
+            const lw_added_mass added =
+                lw_plate_added_mass(plates->density, plates->size[2 * i], plates->size[2 * i + 1]);
+            double *a = wrench->added_inertia + 36 * i;
+            memset(a, 0, 36 * sizeof *a);
+            a[1 * 6 + 1] = added.normal;
+            a[5 * 6 + 5] = added.span;
+        }
+    }
+    return status;
+}

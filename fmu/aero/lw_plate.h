@@ -1,0 +1,37 @@
+/* Quasi-steady forces on thin flat plates; the equations are in fmu/README.md, "Force models".
+ *
+ * A plate's chord lies along body x, its span along body z, its normal along body y, its centre at the
+ * centre of mass.
+ */
+#ifndef LW_PLATE_H
+#define LW_PLATE_H
+
+#include <stdint.h>
+
+#include "lw_forces.h"
+#include "lw_wind.h"
+
+enum { LW_PLATE_RISTROPH = 0, LW_PLATE_ANDERSEN = 1 };
+
+typedef struct {
+    int n;               /* plates */
+    int coefficients;    /* LW_PLATE_RISTROPH or LW_PLATE_ANDERSEN */
+    const int32_t *body; /* (n) the plate's index among all bodies */
+    const double *size;  /* (n, 2) chord and span [m] */
+    double density;      /* of the fluid [kg/m^3] */
+    lw_wind wind;
+} lw_plates;
+
+/* Added mass along the normal, pi rho (c/2)^2 s [kg], and added inertia about the span axis,
+ * pi rho (c/2)^4 s / 8 [kg m^2]. */
+typedef struct { double normal, span; } lw_added_mass;
+
+LW_API lw_added_mass lw_plate_added_mass(double density, double chord, double span);
+
+/* Write the wrench on every plate, without the part that is proportional to its acceleration, and that
+ * part as added inertia (constant). Returns 0, or 1 + the index of the first plate whose wrench is not
+ * finite. */
+LW_API int lw_plates_evaluate(const lw_plates *plates, double t, const lw_motion *motion,
+                              const lw_wrench *wrench);
+
+#endif

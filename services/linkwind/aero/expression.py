@@ -1,0 +1,288 @@
+"""Expressions of a force field → a postfix program for the stack machine of ``fmu/aero/lw_field.h``.
+
+The text is parsed by Python's own parser and never evaluated; whatever is not on the lists below is
+refused, with its column.
+"""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import math
+import warnings
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from linkwind.errors import ExpressionError
+from linkwind.native.forces import (
+    COMPONENTS,
+    LOCALS_SIZE,
+    MAX_INTEGER_POWER,
+    STACK_SIZE,
+    VARIABLES,
+    Operation,
+)
+
+MAX_LENGTH = 10_000
+MAX_NESTING = 100
+
+CONSTANTS = {"pi": math.pi}
+_UNARY = "sin cos tan asin acos atan sinh cosh tanh exp log sqrt abs"
+FUNCTIONS = {name: (Operation[name.upper()], 1, 1) for name in _UNARY.split()} | {
+    "atan2": (Operation.ATAN2, 2, 2),
+    "hypot": (Operation.HYPOT, 2, 2),
+    "min": (Operation.MIN, 2, 99),
+    "max": (Operation.MAX, 2, 99),
+}
+"""Operation, least and most arguments; more than two are taken from left to right."""
+
+_BINARY: dict[type[ast.operator], Operation] = {
+    ast.Add: Operation.ADD,
+    ast.Sub: Operation.SUBTRACT,
+    ast.Mult: Operation.MULTIPLY,
+    ast.Div: Operation.DIVIDE,
+    ast.Pow: Operation.POWER,
+}
+
+RESERVED = frozenset((*VARIABLES, *CONSTANTS, *FUNCTIONS))
+
+
+@dataclass(frozen=True)
+class Program:
+    """Instructions (operation, operand) and the constants that they push."""
+
+    code: tuple[tuple[Operation, int], ...]
+    constants: tuple[float, ...]
+
+    def shifted(self, places: int) -> list[tuple[int, int]]:
+        """Return the code for constants that stand ``places`` further on."""
+        return [(op, operand + places * (op is Operation.CONSTANT)) for op, operand in self.code]
+
+
+def compile_program(let: Mapping[str, str], results: Mapping[str, str], item: str) -> Program:
+    """Return the program that gives the wrench on one body.
+
+    Args:
+        let: named expressions in order; each may use those before it.
+        results: expressions of the components fx … tz; a missing one is zero.
+        item: where they stand, for errors: ``two_link.toml: aero.field.link1``.
+
+    Raises:
+        ExpressionError: a name or an expression is wrong.
+    """
+    compiler = _Compiler()
+    for name, text in let.items():
+        here = f"{item}.let.{name}"
+        _check_name(name, here)
+        compiler.compile(text, here)
+        compiler.define(name, here)
+    for component, text in results.items():
+        compiler.compile(text, f"{item}.{component}")
+        compiler.emit(Operation.RESULT, COMPONENTS.index(component))
+    return Program(tuple(compiler.code), tuple(compiler.constants))
+
+
+def _check_name(name: str, item: str) -> None:
+    if not (name.isidentifier() and name.isascii()):
+        raise ExpressionError(f'{item}: expected a name of letters, digits and _; got "{name}". Rename it.')
+    if name in RESERVED:
+        raise ExpressionError(
+            f'{item}: expected a name that is not taken; got "{name}", which is a variable, constant or '
+            "function of every field. Rename it."
+        )
+
+
+def _parse(text: str, item: str) -> ast.expr:
+    """Return the syntax tree of a text, whose line breaks count as blanks."""
+    if len(text) > MAX_LENGTH:
+        raise ExpressionError(
+            f"{item}: expected at most {MAX_LENGTH} characters; got {len(text)}. Split it into let = {{ … }}."
+        )
+    blank = text.translate({ord(c): " " for c in "\r\n\t\f"})
+    if "#" in blank or not blank.strip():
+        got = '"#", where Python would start a comment' if "#" in blank else "nothing"
+        column = blank.find("#") + 1 or 1
+        raise ExpressionError(f"{item}: column {column}: expected an expression; got {got}. Write one.")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # Python's hints on unusual source text
+            # In brackets a leading blank is no indentation; they shift the columns by one.
+            return ast.parse(f"({blank}\n)", mode="eval").body
+    except (SyntaxError, ValueError) as error:
+        offset = getattr(error, "offset", None) or 2
+        column = min(max(offset - 1, 1), len(text))
+        raise ExpressionError(
+            f'{item}: column {column}: expected an expression; got "{_short(text)}" '
+            f"({getattr(error, 'msg', error)}). Check brackets and operators."
+        ) from None
+    except (RecursionError, MemoryError):
+        raise _too_deep(item) from None
+
+
+def _too_deep(item: str) -> ExpressionError:
+    return ExpressionError(
+        f"{item}: expected at most {MAX_NESTING} nested levels; got more. Name parts of it in let = {{ … }}."
+    )
+
+
+def _short(text: str) -> str:
+    line = " ".join(text.split())
+    return line if len(line) <= 40 else f"{line[:39]}…"
+
+
+class _Compiler:
+    """Emits postfix code for syntax trees, and watches the machine's limits."""
+
+    def __init__(self) -> None:
+        self.code: list[tuple[Operation, int]] = []
+        self.constants: list[float] = []
+        self.locals: dict[str, int] = {}
+        self._text = self._item = ""
+
+    def emit(self, operation: Operation, operand: int = 0) -> None:
+        self.code.append((operation, operand))
+
+    def define(self, name: str, item: str) -> None:
+        if len(self.locals) == LOCALS_SIZE:
+            raise ExpressionError(
+                f"{item}: expected at most {LOCALS_SIZE} names in let; got more. Join some of them."
+            )
+        self.locals[name] = len(self.locals)
+        self.emit(Operation.DEFINE, self.locals[name])
+
+    def compile(self, text: str, item: str) -> None:
+        """Emit the code that leaves the value of ``text`` on the stack."""
+        self._text, self._item = text, item
+        needed = self._expression(_parse(text, item), 1)
+        if needed > STACK_SIZE:
+            raise _too_deep(item)
+
+    def _expression(self, node: ast.expr, level: int) -> int:
+        """Emit one node; return the number of places that it takes on the stack."""
+        if level > MAX_NESTING:
+            raise _too_deep(self._item)
+        match node:
+            case ast.Constant():
+                return self._number(node)
+            case ast.Name():
+                return self._name(node)
+            case ast.UnaryOp(op=ast.USub()):
+                needed = self._expression(node.operand, level + 1)
+                self.emit(Operation.NEGATE)
+                return needed
+            case ast.UnaryOp(op=ast.UAdd()):
+                return self._expression(node.operand, level + 1)
+            case ast.BinOp():
+                return self._chain(node, level)
+            case ast.Call():
+                return self._call(node, level)
+        expected = "numbers, names, + - * / **, brackets and functions"
+        raise self._error(node, expected, self._source(node), "Nothing else is allowed.")
+
+    def _number(self, node: ast.Constant) -> int:
+        value = node.value
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self._error(node, "a number", self._source(node), "Write it like 1.5e-3.")
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
+        if math.isinf(number):
+            raise self._error(node, "a number below 1.8e308", self._source(node), "Write a smaller one.")
+        return self._constant(number)
+
+    def _constant(self, number: float) -> int:
+        if number not in self.constants:
+            self.constants.append(number)
+        self.emit(Operation.CONSTANT, self.constants.index(number))
+        return 1
+
+    def _name(self, node: ast.Name) -> int:
+        name = node.id
+        if name in self.locals:
+            self.emit(Operation.LOCAL, self.locals[name])
+        elif name in VARIABLES:
+            self.emit(Operation.VARIABLE, VARIABLES.index(name))
+        elif name in CONSTANTS:
+            self._constant(CONSTANTS[name])
+        elif name in FUNCTIONS:
+            raise self._error(node, f"{name}(…)", f'"{name}"', "Give the function its argument.")
+        else:
+            known = (*VARIABLES, *CONSTANTS, *self.locals)
+            hint = "Define it in let before it is used."
+            raise self._unknown(node, "one of", known, name, hint)
+        return 1
+
+    def _chain(self, node: ast.BinOp, level: int) -> int:
+        """Emit a + b - c … without a recursion for each term: sums may be long."""
+        chain = [node]
+        while isinstance(left := chain[-1].left, ast.BinOp):
+            chain.append(left)
+        needed = self._expression(left, level + 1)
+        for link in reversed(chain):
+            operation = _BINARY.get(type(link.op))
+            if operation is None:
+                raise self._operator(link)
+            power = _integer_power(link)
+            if power is None:
+                needed = max(needed, 1 + self._expression(link.right, level + 1))
+                self.emit(operation)
+            else:
+                self.emit(Operation.POWER_INTEGER, power)
+        return needed
+
+    def _operator(self, node: ast.BinOp) -> ExpressionError:
+        if isinstance(node.op, ast.BitXor):
+            return self._error(node, "** for a power", f"^ in {self._source(node)}", "Use **.")
+        return self._error(node, "one of + - * / **", self._source(node), "Use one of these operators.")
+
+    def _call(self, node: ast.Call, level: int) -> int:
+        if not isinstance(node.func, ast.Name) or node.func.id not in FUNCTIONS:
+            name = node.func.id if isinstance(node.func, ast.Name) else self._source(node.func).strip('"')
+            raise self._unknown(node, "a function, one of", FUNCTIONS, name, "Only these can be called.")
+        name = node.func.id
+        operation, least, most = FUNCTIONS[name]
+        given = len(node.args)
+        if node.keywords or not least <= given <= most:
+            count = f"{least}" if least == most else f"{least} or more"
+            got = "named ones" if node.keywords else str(given)
+            raise self._error(node, f"{count} arguments of {name}", got, "Separate them by commas.")
+        needed = 0
+        for place, argument in enumerate(node.args):
+            needed = max(needed, min(place, 1) + self._expression(argument, level + 1))
+            if place or most == 1:
+                self.emit(operation)
+        return needed
+
+    def _source(self, node: ast.expr) -> str:
+        start, end = _column(self._text, node.col_offset), _column(self._text, node.end_col_offset or 0)
+        return f'"{_short(self._text[start - 1 : end - 1])}"'
+
+    def _unknown(
+        self, node: ast.expr, what: str, known: Iterable[str], name: str, hint: str
+    ) -> ExpressionError:
+        near = difflib.get_close_matches(name.lower(), known := tuple(known), n=1)
+        advice = f'Did you mean "{near[0]}"?' if near else hint
+        return self._error(node, f"{what} {', '.join(known)}", f'"{name}"', advice)
+
+    def _error(self, node: ast.expr, expected: str, got: str, advice: str) -> ExpressionError:
+        column = _column(self._text, node.col_offset)
+        return ExpressionError(f"{self._item}: column {column}: expected {expected}; got {got}. {advice}")
+
+
+def _column(text: str, offset: int) -> int:
+    """Return the column (from 1) of an offset in bytes of the bracketed text."""
+    return len(text.encode()[: max(offset - 1, 0)].decode(errors="ignore")) + 1
+
+
+def _integer_power(node: ast.BinOp) -> int | None:
+    """Return the exponent, if it is written as a small whole number."""
+    sign, exponent = 1, node.right
+    if isinstance(exponent, ast.UnaryOp) and isinstance(exponent.op, ast.USub):
+        sign, exponent = -1, exponent.operand
+    if not isinstance(node.op, ast.Pow) or not isinstance(exponent, ast.Constant):
+        return None
+    value = exponent.value
+    if isinstance(value, bool) or not isinstance(value, int | float) or value != value // 1:
+        return None
+    return sign * int(value) if value <= MAX_INTEGER_POWER else None

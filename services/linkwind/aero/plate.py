@@ -1,0 +1,92 @@
+"""The quasi-steady flat plate: lift, drag, rotation and added mass from the motion at one instant.
+
+Equations and sources are in ``fmu/README.md``, the arithmetic in ``fmu/aero/lw_plate.c``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from linkwind.aero.base import Capabilities, body_indices
+from linkwind.aero.wind import wind_table
+from linkwind.errors import ProtocolError, ScenarioError, SimulationError
+from linkwind.native.forces import Coefficients, Plates, PlateTable
+from linkwind.scenario import Provider, Scenario
+from linkwind.spatial import Motion, Wrench
+
+
+def plate_table(scenario: Scenario, provider: Provider) -> PlateTable:
+    """Return the constants of the plates of a provider.
+
+    Raises:
+        ScenarioError: a body is not a plate, or the coefficient set is unknown.
+    """
+    indices = body_indices(scenario, provider)
+    size = []
+    for index in indices:
+        shape = scenario.bodies[index].shape
+        if shape is None or shape.type != "plate":
+            got = f'type "{shape.type}"' if shape else "none"
+            raise ScenarioError(
+                f'{scenario.name}.toml: bodies[{index}].shape: expected type "plate" with length and span, '
+                f'for aero model "plate"; got {got}. Add shape = {{ type = "plate", length = … }}.'
+            )
+        size.append((shape.length, shape.span))
+    return PlateTable(
+        body=np.array(indices, dtype=np.int32),
+        size=np.array(size),
+        coefficients=Coefficients[provider.plate.coefficients.upper()],
+        density=scenario.environment.density,
+        wind=wind_table(scenario.environment),
+    )
+
+
+class Plate:
+    """Quasi-steady forces on flat plates.
+
+    The wrench holds circulatory lift, drag, rotational terms and the velocity part of the added mass; the
+    acceleration part is returned as added inertia: π ρ (c/2)² s along the normal and π ρ (c/2)⁴ s / 8 about
+    the span axis, for a plate of chord c and span s.
+
+    Sources: H. Li, T. Goodwill, Z. J. Wang, L. Ristroph, J. Fluid Mech. 937, A6 (2022),
+    doi:10.1017/jfm.2022.89 (``ristroph``); A. Andersen, U. Pesavento, Z. J. Wang, J. Fluid Mech. 541, 65
+    (2005), doi:10.1017/S002211200500594X (``andersen``).
+    """
+
+    capabilities = Capabilities(added_inertia=True)
+
+    def __init__(self, scenario: Scenario, provider: Provider) -> None:
+        self._plates = Plates(plate_table(scenario, provider))
+        self._file, self._bodies = f"{scenario.name}.toml", provider.bodies
+
+    def commit(self, t: float, motion: Motion) -> None:
+        """Do nothing: the forces depend on the present alone."""
+
+    def evaluate(self, t: float, motion: Motion, wrench: Wrench) -> None:
+        """Write the wrench on the plates for the state at time t [s].
+
+        Raises:
+            SimulationError: a wrench is not finite.
+        """
+        status = self._plates.evaluate(t, motion, wrench)
+        if status:
+            raise self._not_finite(status - 1, t, motion)
+
+    def _not_finite(self, plate: int, t: float, motion: Motion) -> SimulationError:
+        body = self._plates.table.body[plate]
+        parts = (motion.position, motion.orientation, motion.linear, motion.angular)
+        names = ("position", "orientation", "velocity", "angular velocity")
+        state = ", ".join(f"{name} {part[body].tolist()}" for name, part in zip(names, parts, strict=True))
+        return SimulationError(
+            f'{self._file}: plate "{self._bodies[plate]}": expected a finite wrench at t = {t:.9g} s; got '
+            f"another at {state}. Has the motion diverged? Try a smaller coupling.step."
+        )
+
+    def save(self) -> bytes:
+        """Return nothing: there is no memory."""
+        return b""
+
+    def restore(self, blob: bytes) -> None:
+        """Take back nothing."""
+        if blob:
+            raise ProtocolError(f"model plate: expected an empty checkpoint; got {len(blob)} bytes.")

@@ -1,0 +1,302 @@
+"""The force models of ``fmu/aero``: their constant tables, and calls that write wrenches in place.
+
+A model is a struct of pointers into the arrays of a frozen table, which the FMU export writes out as
+constants. Motions and wrenches cross as structs of addresses, bound once for each object.
+"""
+
+from __future__ import annotations
+
+import ctypes  # noqa: TID251 - native/ is the one place
+import enum
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwind.native.library import declare
+from linkwind.spatial import Array, Motion, Wrench, address
+
+Indices = NDArray[np.int32]
+
+STACK_SIZE = 64
+LOCALS_SIZE = 64
+MAX_INTEGER_POWER = 16  # above it repeated multiplication loses more digits than pow
+
+VARIABLES = ("t", "x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz", "theta")
+COMPONENTS = ("fx", "fy", "fz", "tx", "ty", "tz")
+
+
+class Operation(enum.IntEnum):
+    """Instructions of the stack machine (``fmu/aero/lw_field.h``)."""
+
+    CONSTANT = 0
+    VARIABLE = 1
+    LOCAL = 2
+    DEFINE = 3
+    RESULT = 4
+    NEGATE = 5
+    ADD = 6
+    SUBTRACT = 7
+    MULTIPLY = 8
+    DIVIDE = 9
+    POWER = 10
+    POWER_INTEGER = 11
+    SIN = 12
+    COS = 13
+    TAN = 14
+    ASIN = 15
+    ACOS = 16
+    ATAN = 17
+    SINH = 18
+    COSH = 19
+    TANH = 20
+    EXP = 21
+    LOG = 22
+    SQRT = 23
+    ABS = 24
+    ATAN2 = 25
+    HYPOT = 26
+    MIN = 27
+    MAX = 28
+
+
+class Coefficients(enum.IntEnum):
+    """Coefficient sets of the plate (``fmu/aero/lw_plate.h``)."""
+
+    RISTROPH = 0
+    ANDERSEN = 1
+
+
+@dataclass(frozen=True)
+class WindTable:
+    """A uniform stream with travelling gusts: U0 + Σ a sin(2π(f t + k·r) + φ).
+
+    Attributes:
+        uniform: U0 [m/s], shape (3,), in W.
+        gusts: a [m/s] (3), f [Hz], k [1/m] (3), φ [rad] of each gust, shape (n, 8), a and k in W.
+    """
+
+    uniform: Array
+    gusts: Array
+
+
+@dataclass(frozen=True)
+class PlateTable:
+    """Flat plates in a wind.
+
+    Attributes:
+        body: index of each plate among all bodies, shape (n,).
+        size: chord and span [m], shape (n, 2).
+        coefficients: the coefficient set of all plates.
+        density: of the fluid [kg/m³].
+        wind: the wind that all plates are in.
+    """
+
+    body: Indices
+    size: Array
+    coefficients: Coefficients
+    density: float
+    wind: WindTable
+
+
+@dataclass(frozen=True)
+class FieldTable:
+    """Postfix programs that give the wrench on bodies.
+
+    Attributes:
+        body: index of each program's body among all bodies, shape (n,).
+        start: first instruction of each program, and the end of the last, shape (n + 1,).
+        code: operation and operand of each instruction, shape (instructions, 2).
+        constants: what ``Operation.CONSTANT`` pushes, shape (any,).
+    """
+
+    body: Indices
+    start: Indices
+    code: Indices
+    constants: Array
+
+
+class _Pointers4(ctypes.Structure):
+    """``lw_motion``."""
+
+    _fields_ = [(name, ctypes.c_void_p) for name in ("position", "orientation", "linear", "angular")]
+
+
+class _Pointers3(ctypes.Structure):
+    """``lw_wrench``."""
+
+    _fields_ = [(name, ctypes.c_void_p) for name in ("force", "torque", "added_inertia")]
+
+
+class _Wind(ctypes.Structure):
+    """``lw_wind``."""
+
+    _fields_ = [("uniform", ctypes.c_double * 3), ("n_gusts", ctypes.c_int), ("gusts", ctypes.c_void_p)]
+
+
+class _Plates(ctypes.Structure):
+    """``lw_plates``."""
+
+    _fields_ = [
+        ("n", ctypes.c_int),
+        ("coefficients", ctypes.c_int),
+        ("body", ctypes.c_void_p),
+        ("size", ctypes.c_void_p),
+        ("density", ctypes.c_double),
+        ("wind", _Wind),
+    ]
+
+
+class _Field(ctypes.Structure):
+    """``lw_field``."""
+
+    _fields_ = [
+        ("n", ctypes.c_int),
+        ("body", ctypes.c_void_p),
+        ("start", ctypes.c_void_p),
+        ("code", ctypes.c_void_p),
+        ("constants", ctypes.c_void_p),
+    ]
+
+
+class _Vec3(ctypes.Structure):
+    """``lw_vec3``."""
+
+    _fields_ = [(name, ctypes.c_double) for name in "xyz"]
+
+
+class _WindSample(ctypes.Structure):
+    """``lw_wind_sample``."""
+
+    _fields_ = [("velocity", _Vec3), ("rate", _Vec3)]
+
+
+class _Bound:
+    """The struct of addresses of the object last seen; holds the object, so that its memory stays."""
+
+    def __init__(self, pointers: type[ctypes.Structure]) -> None:
+        self._pointers = pointers
+        self._object: Motion | Wrench | None = None
+        self._struct: ctypes.Structure | None = None
+        self._at = 0
+
+    def at(self, item: Motion | Wrench) -> int:
+        if item is not self._object:
+            self._struct = self._pointers(*item.addresses)
+            self._at = ctypes.addressof(self._struct)
+            self._object = item
+        return self._at
+
+
+def _indices(array: Indices) -> Indices:
+    return np.ascontiguousarray(array, dtype=np.int32)
+
+
+def _index_address(array: Indices) -> int:
+    return int(array.__array_interface__["data"][0])
+
+
+def _wind_struct(wind: WindTable) -> _Wind:
+    at = address(wind.gusts) if len(wind.gusts) else None
+    return _Wind((ctypes.c_double * 3)(*wind.uniform), len(wind.gusts), at)
+
+
+def wind_at(wind: WindTable, t: float, r: Array, v: Array) -> tuple[Array, Array]:
+    """Return the wind at a point that moves, and its rate of change there.
+
+    Args:
+        wind: the wind.
+        t: time [s].
+        r: the point [m], shape (3,), in W.
+        v: the point's velocity [m/s], shape (3,), in W.
+
+    Returns:
+        Velocity [m/s] and total derivative ∂U/∂t + (v·∇)U [m/s²], each of shape (3,), in W.
+    """
+    function = declare("lw_wind_at", [ctypes.c_void_p, ctypes.c_double, _Vec3, _Vec3], _WindSample)
+    sample = function(ctypes.byref(_wind_struct(wind)), t, _Vec3(*r), _Vec3(*v))
+    velocity, rate = sample.velocity, sample.rate
+    return np.array([velocity.x, velocity.y, velocity.z]), np.array([rate.x, rate.y, rate.z])
+
+
+class Plates:
+    """Quasi-steady flat plates."""
+
+    def __init__(self, table: PlateTable) -> None:
+        self.table = table
+        self._body = _indices(table.body)
+        self._struct = _Plates(
+            len(table.body),
+            table.coefficients,
+            _index_address(self._body),
+            address(table.size),
+            table.density,
+            _wind_struct(table.wind),
+        )
+        self._at = ctypes.addressof(self._struct)
+        arguments = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p]
+        self._evaluate = declare("lw_plates_evaluate", arguments)
+        self._motion, self._wrench = _Bound(_Pointers4), _Bound(_Pointers3)
+
+    def evaluate(self, t: float, motion: Motion, wrench: Wrench) -> int:
+        """Write the wrench on every plate, and its added inertia where the wrench has a place for it.
+
+        Args:
+            t: time [s].
+            motion: all bodies of the scenario.
+            wrench: the plates, in the order of the table; filled in place.
+
+        Returns:
+            0, or 1 + the index of the first plate whose wrench is not finite.
+        """
+        return self._evaluate(self._at, t, self._motion.at(motion), self._wrench.at(wrench))  # type: ignore[no-any-return]
+
+
+class Field:
+    """A force field given as postfix programs.
+
+    Attributes:
+        theta: angle about world z of each body's x axis at the last accepted state [rad], unwrapped,
+            shape (n,); it is the field's only memory.
+    """
+
+    def __init__(self, table: FieldTable, theta: Array) -> None:
+        self.table = table
+        self.theta = theta
+        self._arrays = [_indices(array) for array in (table.body, table.start, table.code)]
+        constants = address(table.constants) if len(table.constants) else None
+        self._struct = _Field(len(table.body), *map(_index_address, self._arrays), constants)
+        self._at, self._theta_at = ctypes.addressof(self._struct), address(theta)
+        pointer = ctypes.c_void_p
+        self._commit: Any = declare("lw_field_commit", [pointer, pointer, pointer], None)
+        self._evaluate = declare("lw_field_evaluate", [pointer, ctypes.c_double, pointer, pointer, pointer])
+        self._motion, self._accepted, self._wrench = map(_Bound, (_Pointers4, _Pointers4, _Pointers3))
+
+    def commit(self, motion: Motion) -> None:
+        """Take the angles of an accepted state as those to unwrap against."""
+        self._commit(self._at, self._accepted.at(motion), self._theta_at)
+
+    def evaluate(self, t: float, motion: Motion, wrench: Wrench) -> int:
+        """Write force and torque on every body.
+
+        Args:
+            t: time [s].
+            motion: all bodies of the scenario.
+            wrench: the field's bodies, in the order of the table; filled in place.
+
+        Returns:
+            0, or 1 + 6 i + c where component c of body i is the first that is not finite.
+        """
+        return self._evaluate(  # type: ignore[no-any-return]
+            self._at, t, self._motion.at(motion), self._theta_at, self._wrench.at(wrench)
+        )
+
+    def variables(self, i: int, t: float, motion: Motion) -> dict[str, float]:
+        """Return the values of all variables for the i-th body of the field."""
+        pointer = ctypes.c_void_p
+        arguments = [pointer, ctypes.c_int, ctypes.c_double, pointer, pointer, pointer]
+        values = np.zeros(len(VARIABLES))
+        function = declare("lw_field_variables", arguments, None)
+        function(self._at, i, t, self._motion.at(motion), self._theta_at, address(values))
+        return dict(zip(VARIABLES, values.tolist(), strict=True))
