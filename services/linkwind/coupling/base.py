@@ -1,0 +1,130 @@
+"""What a coupling scheme is given and what it yields.
+
+Steps count from 0 and communication point k lies at t_k = k·h; schemes see no time, only abscissae in units
+of the step. Wrenches are (n, 6), force first [N, N·m], in W at the centres of mass. Added inertia
+[kg, kg·m, kg·m²] is (n, 6, 6), in the body frames, symmetric positive semi-definite.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+State = Any  # the plant's own; a scheme stores it and hands it back, never looks inside, never changes it
+
+
+class Answer(NamedTuple):
+    """What the fluid does to the bodies at one communication point, all providers together.
+
+    Attributes:
+        wrench: shape (n, 6), without the part that is proportional to acceleration. Copied by the scheme.
+        added_inertia: ``A``, shape (n, 6, 6), for a further wrench −A·a; None for none. Copied as well.
+    """
+
+    wrench: Array
+    added_inertia: Array | None = None
+
+
+class Plant(Protocol):
+    """The bodies."""
+
+    def advance(self, state: State, nodes: Array, wrenches: Array, added_inertia: Array | None) -> State:
+        """Return the state one step later; pure.
+
+        Args:
+            state: at the start of the step.
+            nodes: abscissae of the wrenches in steps from the start of this one (1 = its end), shape (m,).
+            wrenches: values at the nodes, shape (m, n, 6); the wrench is the polynomial through them.
+            added_inertia: held over the step, shape (n, 6, 6); None for none.
+
+        The arrays are C-contiguous, and in the steady state of a run always the same few objects, so that a
+        plant may remember their addresses. Their content is valid during the call only.
+
+        Raises:
+            SimulationError: numerical trouble; the result of a return is finite.
+        """
+        ...
+
+
+class Exchange(Protocol):
+    """The fluid."""
+
+    def __call__(self, step: int, iteration: int, accepted: State, trial: State) -> Answer:
+        """Ask for the wrench at communication point ``step`` and return the answer.
+
+        Args:
+            step: k+1; 0 asks for the wrench on the initial state (both states are that one).
+            iteration: counts from 0 within a step; above 0 the provider goes back to t_k and does it again.
+            accepted: the state at t_k as known now.
+            trial: a prediction of the state at t_{k+1}, on which the wrench is evaluated.
+        """
+        ...
+
+
+class CommunicationPoint(NamedTuple):
+    """A communication point whose state is final.
+
+    Attributes:
+        step: k.
+        state: accepted at t_k.
+        trial: the state on which the wrench at t_k was evaluated.
+        wrench: at t_k, shape (n, 6): the last answer for it. A copy.
+        added_inertia: that came with it, shape (n, 6, 6); None for none.
+        order: degree of the extrapolation that led to the trial.
+        errors: extrapolation error by degree 0 … p, smoothed (E of `degree`), shape (p+1,), NaN in the
+            start-up; empty for a scheme that does not extrapolate. A copy.
+        iterations: exchanges made for this point.
+    """
+
+    step: int
+    state: State
+    trial: State
+    wrench: Array
+    added_inertia: Array | None
+    order: int
+    errors: Array
+    iterations: int
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of a coupling scheme; each scheme reads its own.
+
+    Attributes:
+        weight: 1/mass of the bodies for the three forces and a mean 1/inertia for the three torques, shape
+            (n, 6): weighs wrenches so that an error of either kind counts by what it does to the motion.
+        order: p, highest degree of extrapolation, 0–3.
+        adaptive: let the degree fall below p where the wrench is not smooth (see `degree`).
+        held: the wrench is a mean over the step (kind "mean" of any provider), so it has no value at a point
+            and must not be interpolated: it is held over the step that it was averaged over.
+    """
+
+    weight: Array
+    order: int = 3
+    adaptive: bool = True
+    held: bool = False
+
+    def __post_init__(self) -> None:
+        weight = np.array(self.weight, dtype=np.float64)
+        if weight.ndim != 2 or weight.shape[1] != 6:
+            raise ValueError(f"weight: expected shape (n, 6); got {weight.shape}")
+        if not (np.isfinite(weight).all() and (weight >= 0.0).all()):
+            raise ValueError("weight: expected finite numbers >= 0")
+        if not 0 <= self.order <= 3:
+            raise ValueError(f"order: expected 0, 1, 2 or 3; got {self.order}")
+        object.__setattr__(self, "weight", weight)
+
+
+class Scheme(Protocol):
+    """A coupling scheme: a generator function."""
+
+    def __call__(
+        self, plant: Plant, exchange: Exchange, initial: State, steps: int, settings: Settings
+    ) -> Iterator[CommunicationPoint]:
+        """Drive ``steps`` steps from ``initial`` and yield the points 0 … steps in order, each when final."""
+        ...
