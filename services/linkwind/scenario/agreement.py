@@ -16,7 +16,10 @@ if TYPE_CHECKING:
 
 def disagreements(scenario: Scenario) -> list[Problem]:
     """Return everything that does not fit together, in the order of the file."""
-    problems = [*_end(scenario), *_names(scenario), *_inertias(scenario), *_joints(scenario)]
+    repeated = list(_names(scenario))
+    if repeated:
+        return repeated  # what a name refers to is not known
+    problems = [*_end(scenario), *_inertias(scenario), *_joints(scenario)]
     for index, provider in enumerate(scenario.providers):
         problems += _provider(scenario, provider, ("providers", index))
     return problems + list(_masses(scenario))

@@ -69,7 +69,7 @@ def loads(text: str, name: str, overrides: Sequence[str] = ()) -> Scenario:
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise ScenarioError(f"{name}: expected valid TOML; got: {error}. Correct it.") from None
+        raise ScenarioError(f"{name}: expected valid TOML; got: {_flat(error)}. Correct it.") from None
     return _scenario(data, name, overrides)
 
 
@@ -82,7 +82,7 @@ def from_json(text: str, name: str = "scenario.json") -> Scenario:
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise ScenarioError(f"{name}: expected valid JSON; got: {error}. Correct it.") from None
+        raise ScenarioError(f"{name}: expected valid JSON; got: {_flat(error)}. Correct it.") from None
     if not isinstance(data, dict):
         raise ScenarioError(f"{name}: expected an object; got {type(data).__name__}. Correct it.")
     return _scenario(data, name, ())
@@ -91,6 +91,10 @@ def from_json(text: str, name: str = "scenario.json") -> Scenario:
 def template() -> str:
     """Return the commented scenario that ``linkwind init`` writes: every key, its unit and default."""
     return _PACKAGE.joinpath("template.toml").read_text(encoding="utf-8")
+
+
+def _flat(error: Exception) -> str:
+    return " ".join(str(error).split())
 
 
 def _scenario(data: dict[str, Any], name: str, overrides: Sequence[str]) -> Scenario:

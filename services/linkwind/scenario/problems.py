@@ -28,6 +28,7 @@ SYNONYMS = {
     "ode45": "dopri5",
     "angle": "angle_deg",
     "dt": "step",
+    "implicit": "pec",  # spelled like explicit, but that is the opposite
 }
 
 

@@ -31,12 +31,13 @@ class Source:
 
     def line(self, problem: Problem) -> str:
         """Return the problem as one line, with the file or the override that it comes from."""
-        origin = self.file
-        for length in range(len(problem.path), 0, -1):
-            if problem.path[:length] in self.overridden:
-                origin = f"--set {self.overridden[problem.path[:length]]}"
-                break
-        return f"{origin}: {replace(problem, path=self.written(problem.path)).line()}"
+        path, origin = problem.path, self.file
+        for overridden, argument in self.overridden.items():
+            shorter = min(len(path), len(overridden))
+            if path and path[:shorter] == overridden[:shorter]:
+                origin = f"--set {argument}"
+        text = f"{origin}: {replace(problem, path=self.written(path)).line()}"
+        return " ".join(text.splitlines())
 
 
 def expand(data: dict[str, Any], stem: str) -> tuple[dict[str, Any], bool]:

@@ -35,26 +35,37 @@ _LIMITS = {
 
 def problems(error: ValidationError, model: type[BaseModel]) -> list[Problem]:
     """Return what pydantic found wrong with the data of ``model``, in its order."""
+    details = error.errors(include_url=False)
+    missing = {detail["loc"] for detail in details if detail["type"] == "missing"}
+    meant: set[Path] = set()  # missing keys that a misspelled one explains
     found: list[Problem] = []
-    for detail in error.errors(include_url=False):
+    for detail in details:
         path: Path = detail["loc"]
         cause = detail.get("ctx", {}).get("error")
         if isinstance(cause, ProblemError):
             found += [problem.below(path) for problem in cause.problems]
+        elif detail["type"] == "extra_forbidden":
+            found.append(_unknown_key(path, model))
+            near = nearest(str(path[-1]), _keys(path, model))
+            meant |= missing & {(*path[:-1], near or "")}
+        elif detail["type"] == "too_short" and any(_inside(other["loc"], path) for other in details):
+            pass  # pydantic does not count entries that have errors of their own
         else:
             found.append(_problem(detail, path, model))
-    return found
+    return [problem for problem in found if problem.path not in meant]
+
+
+def _inside(path: Path, table: Path) -> bool:
+    return len(path) > len(table) and path[: len(table)] == table
 
 
 def _problem(detail: ErrorDetails, path: Path, model: type[BaseModel]) -> Problem:
     kind, got = detail["type"], show(detail["input"])
     field = _field(model, path)
     unit = _unit(field)
-    if kind == "extra_forbidden":
-        return _unknown_key(path, model)
     if kind == "missing":
-        described = field.description if field else None
-        return Problem(path, f"{described or 'a value'}", "nothing", f"Add {path[-1]}.")
+        described = f" ({field.description})" if field else ""
+        return Problem(path, f"a value{described}", "nothing", f"Add {path[-1]}.")
     if kind == "literal_error":
         words = re.findall(r"'([^']*)'", str(detail["ctx"]["expected"]))
         return choice(path, "one of", words, detail["input"])
@@ -76,6 +87,8 @@ def _advice(kind: str, value: Any, unit: str) -> str:
     if kind in ("float_type", "int_type") and isinstance(value, str):
         return "Write the number alone, without quotes" + (" and unit." if unit else ".")
     examples = {
+        "int_from_float": "Write it without a decimal point.",
+        "int_type": "Write it without a decimal point.",
         "bool_type": "Write true or false, without quotes.",
         "string_type": 'Write it as "…".',
         "model_type": "Write it as [table] or { key = value }.",
@@ -86,11 +99,16 @@ def _advice(kind: str, value: Any, unit: str) -> str:
 
 
 def _unknown_key(path: Path, model: type[BaseModel]) -> Problem:
-    owner = _model(model, path[:-1]) or model
-    keys, word = list(owner.model_fields), str(path[-1])
+    keys, word = _keys(path, model), str(path[-1])
     near = nearest(word, keys)
     advice = f'Use "{near}".' if near else "Remove it."
     return Problem(path, f"a key among {', '.join(keys)}", show(word), advice)
+
+
+def _keys(path: Path, model: type[BaseModel]) -> list[str]:
+    """Return the keys that the table around a path may have."""
+    owner = _model(model, path[:-1]) or model
+    return [*owner.model_fields, "aero"] if owner is model else list(owner.model_fields)
 
 
 def _unit(field: FieldInfo | None) -> str:
