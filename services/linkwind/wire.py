@@ -116,6 +116,7 @@ class FixedLayout:
         regions: place of every fixed-width field, by dotted name such as ``"trial.position"``.
         views: 1-D array into the buffer for every fixed-width field, one element for a scalar, none for
             an empty repeated field. A message or scalar that is absent has no view.
+        buffer: the message with the present values, which the views look into.
         size: length of the message [bytes].
         template: the bytes of the message as first given.
 
@@ -127,9 +128,9 @@ class FixedLayout:
         self.template: bytes = message.SerializeToString()
         self.size = len(self.template)
         self.regions = dict(_regions(self.template, 0, self.size, message.DESCRIPTOR, ""))
-        self._buffer = bytearray(self.template)
+        self.buffer = bytearray(self.template)
         self.views: dict[str, NDArray[Any]] = {
-            name: np.frombuffer(self._buffer, region.dtype, region.size, region.offset)
+            name: np.frombuffer(self.buffer, region.dtype, region.size, region.offset)
             for name, region in self.regions.items()
         }
         self.views.update(_empty(message))
@@ -139,7 +140,7 @@ class FixedLayout:
 
     def payload(self) -> bytes:
         """Return the message with the present values, as protobuf itself would serialise it."""
-        return bytes(self._buffer)
+        return bytes(self.buffer)
 
     def load(self, data: bytes) -> bool:
         """Take over the values of a serialised message if it has this very layout.
@@ -153,7 +154,7 @@ class FixedLayout:
         """
         if len(data) != self.size or self._unpack(data) != self._expected:
             return False
-        self._buffer[:] = data
+        self.buffer[:] = data
         return True
 
     def fill(self, message: Any) -> None:

@@ -1,0 +1,45 @@
+"""What a linkwind log holds, by the names that its writer and its reader share.
+
+Topics carry the messages of ``schemas/linkwind/v1``; ``log_time`` is simulation time [ns]. Beside them
+the file has the resolved scenario as an attachment and three metadata records.
+"""
+
+from __future__ import annotations
+
+import json
+import zlib
+
+PROFILE = "linkwind"  # of the MCAP header
+PACKAGE = "linkwind.v1."
+
+MOTION, STATE, STEP, TIMING = "/motion", "/state", "/step", "/timing"
+WRENCH = "/wrench/"  # and the name of the provider
+TRANSFORMS, SCENE = "/tf", "/scene"  # pictures for Foxglove, decimated
+
+MESSAGE_OF = {MOTION: "MotionStep", STATE: "State", STEP: "Step", TIMING: "Timing"}
+
+SCENARIO = "scenario.json"  # attachment: the resolved scenario
+
+RUN = "linkwind"  # metadata: run id, bodies, schema hash and what the caller adds
+VERSIONS = "linkwind.versions"  # metadata: versions of the programs, processor
+END = "linkwind.end"  # metadata: how the run ended; missing when the writer was killed
+
+
+def message_name(topic: str) -> str | None:
+    """Return the name of the message that a topic carries, None for a topic that is not linkwind's."""
+    return "WrenchStep" if topic.startswith(WRENCH) else MESSAGE_OF.get(topic)
+
+
+def sealed(record: dict[str, str]) -> dict[str, str]:
+    """Return a metadata record with a checksum, which MCAP itself does not give it."""
+    return record | {"crc32": _checksum(record)}
+
+
+def unsealed(record: dict[str, str]) -> dict[str, str] | None:
+    """Return a metadata record without its checksum, None if the checksum is wrong."""
+    bare = {key: value for key, value in record.items() if key != "crc32"}
+    return bare if record.get("crc32") == _checksum(bare) else None
+
+
+def _checksum(record: dict[str, str]) -> str:
+    return f"{zlib.crc32(json.dumps(record, sort_keys=True).encode()):08x}"

@@ -1,0 +1,142 @@
+"""Pictures of a run for Foxglove: transforms of the bodies and a scene with plates, joints and forces.
+
+Every update holds the whole scene, because after a jump in time Foxglove shows the latest message of a
+topic only. Frames are few: at most 60 a second of simulation time and about 1000 a run, chosen by
+counting steps.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from foxglove.messages import (  # noqa: TID251 - log/ is the one place
+    ArrowPrimitive,
+    Color,
+    CubePrimitive,
+    FrameTransform,
+    FrameTransforms,
+    Pose,
+    Quaternion,
+    SceneEntity,
+    SceneUpdate,
+    SpherePrimitive,
+    Timestamp,
+    Vector3,
+)
+
+from linkwind.spatial import Motion, Wrench
+
+FRAMES_PER_SECOND = 60.0
+FRAMES_PER_RUN = 1000
+STANDARD_GRAVITY = 9.80665  # m/s²
+
+LINK = Color(r=0.27, g=0.51, b=0.71, a=1.0)
+JOINT = Color(r=0.90, g=0.60, b=0.00, a=1.0)
+FORCE = Color(r=0.80, g=0.25, b=0.20, a=1.0)
+
+ORIGIN = Pose(position=Vector3(x=0.0, y=0.0, z=0.0), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0))
+
+
+class Scene:
+    """The picture of one scenario's bodies.
+
+    A plate is a box of its length and span, a body without a shape a ball; a joint is a small sphere at
+    its point on the child; a force is an arrow from the centre of mass, as long as the longest plate for
+    the weight of the heaviest body.
+
+    Args:
+        scenario: the resolved scenario as parsed JSON.
+
+    Attributes:
+        stride: steps from one frame to the next.
+    """
+
+    def __init__(self, scenario: dict[str, Any]) -> None:
+        bodies, step = scenario["bodies"], scenario["coupling"]["step"]
+        steps = round(scenario["time"]["end"] / step)
+        self.stride = max(1, math.ceil(1.0 / (FRAMES_PER_SECOND * step)), math.ceil(steps / FRAMES_PER_RUN))
+        self._names = [body["name"] for body in bodies]
+        shapes = [body.get("shape") for body in bodies]
+        self._length = max((shape["length"] for shape in shapes if shape), default=1.0)
+        weight = max(body["mass"] for body in bodies) * STANDARD_GRAVITY
+        self._metres_per_newton = self._length / weight if weight > 0.0 else self._length
+        self._cubes = [[self._plate(shape)] if shape else [] for shape in shapes]
+        self._balls: list[list[SpherePrimitive]] = [
+            [] if shape else [self._ball((0.0, 0.0, 0.0), 0.2, LINK)] for shape in shapes
+        ]
+        for joint in scenario["joints"]:
+            child = self._names.index(joint["child"])
+            self._balls[child].append(self._ball(joint["child_point"], 0.06, JOINT))
+
+    def _plate(self, shape: dict[str, Any]) -> CubePrimitive:
+        size = Vector3(x=shape["length"], y=0.02 * self._length, z=shape["span"])
+        return CubePrimitive(pose=ORIGIN, size=size, color=LINK)
+
+    def _ball(self, point: Any, diameter: float, color: Color) -> SpherePrimitive:
+        x, y, z = point
+        d = diameter * self._length
+        pose = Pose(position=Vector3(x=x, y=y, z=z), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0))
+        return SpherePrimitive(pose=pose, size=Vector3(x=d, y=d, z=d), color=color)
+
+    def transforms(self, time_ns: int, motion: Motion) -> FrameTransforms:
+        """Return the frame of every body, named as the body, in the frame ``world``."""
+        stamp, frames = timestamp(time_ns), []
+        poses = zip(self._names, motion.position.tolist(), motion.orientation.tolist(), strict=True)
+        for name, (x, y, z), (qw, qx, qy, qz) in poses:
+            frames.append(
+                FrameTransform(
+                    timestamp=stamp,
+                    parent_frame_id="world",
+                    child_frame_id=name,
+                    translation=Vector3(x=x, y=y, z=z),
+                    rotation=Quaternion(x=qx, y=qy, z=qz, w=qw),
+                )
+            )
+        return FrameTransforms(transforms=frames)
+
+    def update(self, time_ns: int, motion: Motion, wrench: Wrench) -> SceneUpdate:
+        """Return the whole scene at one time; ``wrench`` is the total on every body, in W."""
+        stamp, entities = timestamp(time_ns), []
+        states = zip(motion.position.tolist(), wrench.force.tolist(), strict=True)
+        for i, (position, force) in enumerate(states):
+            name = self._names[i]
+            entities.append(
+                SceneEntity(
+                    timestamp=stamp, frame_id=name, id=name, frame_locked=True,
+                    cubes=self._cubes[i], spheres=self._balls[i],
+                )
+            )  # fmt: skip
+            arrows = self._arrows(position, force)
+            entities.append(SceneEntity(timestamp=stamp, frame_id="world", id=f"{name} force", arrows=arrows))
+        return SceneUpdate(entities=entities)
+
+    def _arrows(self, position: list[float], force: list[float]) -> list[ArrowPrimitive]:
+        newtons = math.hypot(*force)
+        if not 0.0 < newtons < math.inf:
+            return []
+        length, thickness = newtons * self._metres_per_newton, 0.02 * self._length
+        head = min(0.1 * self._length, 0.5 * length)
+        x, y, z = position
+        return [
+            ArrowPrimitive(
+                pose=Pose(position=Vector3(x=x, y=y, z=z), orientation=along(*force)),
+                shaft_length=length - head, shaft_diameter=thickness,
+                head_length=head, head_diameter=2.0 * thickness, color=FORCE,
+            )
+        ]  # fmt: skip
+
+
+def along(x: float, y: float, z: float) -> Quaternion:
+    """Return the shortest rotation that turns the x axis, along which arrows lie, to (x, y, z)."""
+    length = math.hypot(x, y, z)
+    if x < 0.0 and math.hypot(y, z) < 1e-12 * length:
+        return Quaternion(x=0.0, y=0.0, z=1.0, w=0.0)
+    w = length + x  # half-angle formula: (1 + e·d, e × d), normalised
+    norm = math.hypot(w, y, z)
+    return Quaternion(x=0.0, y=-z / norm, z=y / norm, w=w / norm)
+
+
+def timestamp(time_ns: int) -> Timestamp:
+    """Return simulation time as Foxglove's seconds and nanoseconds."""
+    return Timestamp(sec=time_ns // 1_000_000_000, nsec=time_ns % 1_000_000_000)

@@ -1,0 +1,49 @@
+"""The file under the MCAP writer, which does not lose an error.
+
+Where a write fails, for want of space say, foxglove-sdk prints a line for this and for every later
+message and goes on as if nothing had happened. This file keeps the error for its owner instead.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+
+class Sink:
+    """A new file that is only appended to.
+
+    Attributes:
+        failure: why a write failed, None as long as none did. From then on nothing is written.
+
+    Raises:
+        OSError: the file exists already or cannot be made.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
+        self._position = 0
+        self.failure: OSError | None = None
+
+    def write(self, data: Any, /) -> int:
+        """Write all of ``data``; on failure, keep the reason."""
+        rest = memoryview(data)
+        self._position += len(rest)
+        try:
+            while rest and self.failure is None:
+                rest = rest[os.write(self._descriptor, rest) :]
+        except OSError as error:
+            self.failure = error
+        return len(data)
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET, /) -> int:
+        """Return the position; the MCAP writer never moves it."""
+        return self._position
+
+    def flush(self) -> None:
+        """Nothing to do: every write went to the operating system."""
+
+    def close(self) -> None:
+        """Close the file."""
+        os.close(self._descriptor)
