@@ -1,0 +1,70 @@
+"""Mechanisms: from the bodies and joints of a scenario to the tables and the start that the core needs.
+
+>>> mechanism = build(load("two_link"))
+>>> mechanism.joints
+('world-link1', 'hinge')
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from linkwind.mechanism.start import WORLD_START, JointStart, Start, start
+from linkwind.mechanism.tables import tables
+from linkwind.mechanism.tree import WORLD, carriers, order
+from linkwind.native.multibody import Tables
+from linkwind.scenario import Scenario
+from linkwind.spatial import Array
+
+__all__ = ["Mechanism", "build"]
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A mechanism as the core takes it.
+
+    Attributes:
+        bodies: names, in scenario order.
+        joints: name of the joint that carries each body; an automatic root is ``world-`` and the body's
+            name.
+        tables: bodies, joints and gravity as flat arrays.
+        q0: joint coordinates at the start [m, rad, unit quaternions], shape (nq,).
+        v0: joint velocities at the start [m/s, rad/s], shape (nv,).
+        has_joints: whether the scenario states any joint.
+    """
+
+    bodies: tuple[str, ...]
+    joints: tuple[str, ...]
+    tables: Tables
+    q0: Array
+    v0: Array
+    has_joints: bool
+
+
+def build(scenario: Scenario) -> Mechanism:
+    """Return the mechanism of a scenario.
+
+    A body without a joint gets one to the world at its centre of mass: ``planar`` if every inertia is a
+    single number, so that its coordinates are x, y and the angle, else ``free``.
+
+    Raises:
+        MechanismError: joints that leave the plane of a planar mechanism, springs that do not fit their
+            joint, or a body that starts in a way that its joint does not allow.
+    """
+    carried = carriers(scenario)
+    bodies: dict[int, Start] = {WORLD: WORLD_START}
+    joints: dict[int, JointStart] = {}
+    for i in order([carrier.parent for carrier in carried]):
+        item = f"{scenario.name}: bodies[{i}]"
+        bodies[i], joints[i] = start(scenario.bodies[i], carried[i], bodies[carried[i].parent], item)
+    starts = [joints[i] for i in range(len(carried))]
+    return Mechanism(
+        bodies=tuple(body.name for body in scenario.bodies),
+        joints=tuple(carrier.name for carrier in carried),
+        tables=tables(scenario, carried, starts),
+        q0=np.concatenate([joint.q for joint in starts]),
+        v0=np.concatenate([joint.v for joint in starts]),
+        has_joints=bool(scenario.joints),
+    )

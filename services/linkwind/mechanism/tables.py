@@ -1,0 +1,98 @@
+"""The numbers of a mechanism, laid out as the core reads them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from linkwind.errors import MechanismError
+from linkwind.mechanism.quaternion import matrix
+from linkwind.mechanism.start import JointStart
+from linkwind.mechanism.tree import Carrier, order
+from linkwind.native.multibody import JOINT_TYPES, NQ, NV, Tables
+from linkwind.scenario import Body, Scenario
+from linkwind.spatial import Array
+
+
+def tables(scenario: Scenario, carriers: list[Carrier], joints: list[JointStart]) -> Tables:
+    """Return the tables of a mechanism, bodies in scenario order.
+
+    Raises:
+        MechanismError: springs or dampers do not fit the joint's degrees of freedom.
+    """
+    types = [carrier.type for carrier in carriers]
+    parents = [carrier.parent for carrier in carriers]
+    return Tables(
+        parent=np.array(parents, dtype=np.int32),
+        order=np.array(order(parents), dtype=np.int32),
+        joint_type=np.array([JOINT_TYPES[kind] for kind in types], dtype=np.int32),
+        q_index=_starts([NQ[kind] for kind in types]),
+        v_index=_starts([NV[kind] for kind in types]),
+        parent_point=np.array([carrier.parent_point for carrier in carriers]),
+        parent_rotation=np.array([matrix(joint.parent_rotation) for joint in joints]),
+        child_point=np.array([carrier.child_point for carrier in carriers]),
+        child_rotation=np.array([matrix(joint.child_rotation) for joint in joints]),
+        mass=np.array([body.mass for body in scenario.bodies]),
+        inertia=np.array([_inertia(body) for body in scenario.bodies]),
+        gravity=np.array(scenario.environment.gravity),
+        stiffness=np.concatenate([_per_freedom(carrier, "stiffness") for carrier in carriers]),
+        damping=np.concatenate([_per_freedom(carrier, "damping") for carrier in carriers]),
+        rest=np.concatenate([_rest(carrier) for carrier in carriers]),
+    )
+
+
+def _starts(lengths: list[int]) -> np.ndarray[tuple[int], np.dtype[np.int32]]:
+    """Return where each of the consecutive pieces starts."""
+    return np.cumsum([0, *lengths[:-1]], dtype=np.int32)
+
+
+def _inertia(body: Body) -> tuple[float, ...]:
+    """Return Ixx, Iyy, Izz, Ixy, Ixz, Iyz [kg·m²].
+
+    A planar body gets the inertia of a flat disc in the plane, Ixx = Iyy = Izz/2: physical, and without
+    influence on motion in the plane.
+    """
+    if isinstance(body.inertia, float):
+        half = body.inertia / 2.0
+        return half, half, body.inertia, 0.0, 0.0, 0.0
+    return body.inertia
+
+
+def _per_freedom(carrier: Carrier, key: str) -> Array:
+    """Return stiffness or damping for each degree of freedom."""
+    count = NV[carrier.type]
+    value = getattr(carrier.joint, key) if carrier.joint else 0.0
+    numbers = value if isinstance(value, tuple) else (value,) * count
+    if len(numbers) != count or (value and not count):
+        _refuse(carrier, key, f"one number, or {count}", value)
+    return np.array(numbers, dtype=np.float64)
+
+
+def _rest(carrier: Carrier) -> Array:
+    """Return the joint coordinates at which the springs are relaxed; rotations as unit quaternions."""
+    count = NQ[carrier.type]
+    value = carrier.joint.rest if carrier.joint else None
+    rest = np.zeros(count)
+    turns_freely = carrier.type in ("spherical", "free")
+    if turns_freely:
+        rest[-4] = 1.0
+    if value is None:
+        return rest
+    numbers = value if isinstance(value, tuple) else (value,)
+    if len(numbers) != count:
+        _refuse(carrier, "rest", f"{count} {'number' if count == 1 else 'numbers'}", value)
+    rest[:] = numbers
+    if turns_freely:
+        norm = math.hypot(*rest[-4:])
+        if abs(norm - 1.0) > 1e-6:
+            _refuse(carrier, "rest", "a unit quaternion [w, x, y, z] at the end", value)
+        rest[-4:] /= norm
+    return rest
+
+
+def _refuse(carrier: Carrier, key: str, expected: str, value: float | tuple[float, ...]) -> None:
+    got = list(value) if isinstance(value, tuple) else value
+    raise MechanismError(
+        f"{carrier.item}.{key}: expected {expected} for a {carrier.type} joint; got {got}. Correct it."
+    )
