@@ -362,7 +362,7 @@ class DynamicsSession:
     def _on_ready(self, message: Any) -> Any:
         ready = message.ready
         known = self._participants.get(ready.name)
-        if known is None or known.instance != ready.instance:
+        if known is None or not known.instance or known.instance != ready.instance:
             raise RefusedError(f'"{ready.name}": Ready without Hello')
         if ready.response_size:
             self.failure = RefusedError(

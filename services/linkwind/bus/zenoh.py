@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import socket
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -52,12 +53,20 @@ def _open(listen: Sequence[str], connect: Sequence[str]) -> zenoh.Session:
         ) from error
 
 
+def loopback_endpoint() -> str:
+    """Return an endpoint of this machine that nobody listens on now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
 class _Endpoint:
     """What both ends share: a queue of incoming messages whose reader can be woken up by trouble."""
 
     def __init__(self, listen: Sequence[str], connect: Sequence[str]) -> None:
         self._session = _open(listen, connect)
         self._trouble: LinkwindError | None = None
+        self._reading = False
         self._closing = threading.Event()
         self._look = threading.Event()
         self._watchdog = threading.Thread(target=self._watch, name="linkwind-watchdog", daemon=True)
@@ -97,7 +106,7 @@ class _Endpoint:
     def _fail(self, error: LinkwindError) -> None:
         if self._trouble is None:
             self._trouble = error
-        self._look.set()
+            self._look.set()
 
     def _watch(self) -> None:
         """Look around every tick; wake the reader up so that it sees trouble, or a signal."""
@@ -106,7 +115,8 @@ class _Endpoint:
             self._look.clear()
             if not self._closing.is_set():
                 self._check()
-                self._wake()
+                if self._reading:  # else nobody would take it away, and a full queue blocks
+                    self._wake()
 
     def _check(self) -> None:
         raise NotImplementedError
@@ -121,7 +131,9 @@ class _Endpoint:
 
     def _receive(self) -> zenoh.Sample:
         while True:
+            self._reading = True
             sample = self._incoming.recv()
+            self._reading = False
             if self._trouble is not None:
                 raise self._trouble
             if len(sample.payload):

@@ -1,0 +1,5 @@
+"""``python -m linkwind``."""
+
+from linkwind.cli import main
+
+main()

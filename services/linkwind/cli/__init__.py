@@ -1,0 +1,48 @@
+"""The command line. Commands import what they need when they run, so that ``--help`` answers at once."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from linkwind.cli import logs, report, run, scenario, services
+from linkwind.errors import LinkwindError
+
+app = typer.Typer(
+    name="linkwind",
+    help="Co-simulation of mechanisms moving in a flow.\n\nStart with: linkwind run two_link",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+run.register(app)
+services.register(app)
+scenario.register(app)
+report.register(app)
+logs.register(app)
+
+
+@app.callback(invoke_without_command=True)
+def version(
+    show: bool = typer.Option(False, "--version", help="Print the version and exit.", is_eager=True),
+) -> None:
+    """Hold the options that come before a command."""
+    if show:
+        from linkwind import __version__
+
+        typer.echo(__version__)
+        raise typer.Exit
+
+
+def main() -> None:
+    """Run the command line; an error is one message and an exit code that tells its kind."""
+    try:
+        app()
+    except LinkwindError as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(error.exit_code)
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        sys.exit(130)

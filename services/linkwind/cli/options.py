@@ -1,0 +1,24 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+ScenarioArgument = Annotated[str, typer.Argument(help="A built-in scenario's name, or a TOML file.")]
+OutOption = Annotated[
+    Path | None, typer.Option("--out", help="Folder for the results; a new one under runs/ if not given.")
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Override a key, such as coupling.step=5e-4; repeatable."),
+]
+ListenOption = Annotated[
+    list[str] | None, typer.Option("--listen", metavar="ENDPOINT", help="Listen here, such as tcp/0.0.0.0:7447.")
+]
+ConnectOption = Annotated[
+    list[str] | None, typer.Option("--connect", metavar="ENDPOINT", help="Connect there, such as tcp/10.0.0.2:7447.")
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]

@@ -1,0 +1,104 @@
+"""``linkwind run`` and ``linkwind dynamics``: a run, its progress and its summary."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from linkwind.cli.options import ConnectOption, JsonOption, ListenOption, OutOption, ScenarioArgument, SetOption
+
+if TYPE_CHECKING:
+    from linkwind.runs.run import Outcome, Progress
+    from linkwind.scenario import Scenario
+
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands."""
+    app.command()(run)
+    app.command()(dynamics)
+
+
+def run(
+    scenario: ScenarioArgument,
+    out: OutOption = None,
+    set_: SetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Run a scenario: start every participant, exchange, log, report.
+
+    Example: linkwind run two_link --set coupling.step=5e-4
+    """
+    from linkwind.runs.run import run as run_scenario
+    from linkwind.scenario import load
+
+    loaded = load(scenario, set_ or [])
+    _show(loaded, lambda progress: run_scenario(loaded, out, progress), as_json=as_json)
+
+
+def dynamics(
+    scenario: ScenarioArgument,
+    out: OutOption = None,
+    set_: SetOption = None,
+    listen: ListenOption = None,
+    connect: ConnectOption = None,
+    run_id: Annotated[str, typer.Option("--run", help="Id of the run; the folder's name if not given.")] = "",
+    as_json: JsonOption = False,
+) -> None:
+    """Start the dynamics alone; the providers connect from elsewhere.
+
+    Example: linkwind dynamics two_link --listen tcp/0.0.0.0:7447
+    """
+    from linkwind.runs.run import dynamics as run_dynamics
+    from linkwind.scenario import load
+
+    loaded = load(scenario, set_ or [])
+    if not listen and not connect:
+        listen = [DEFAULT_ENDPOINT]
+    if not as_json:
+        for provider in loaded.providers:
+            where = (listen or connect or [""])[0].replace("0.0.0.0", "THIS-MACHINE")
+            typer.echo(f"waiting for {provider.name}: linkwind aero --connect {where} --name {provider.name}")
+    _show(
+        loaded,
+        lambda progress: run_dynamics(
+            loaded, out, progress, run_id=run_id, listen=listen or [], connect=connect or []
+        ),
+        as_json=as_json,
+    )
+
+
+def _show(scenario: Scenario, job: Callable[[Progress], Outcome], *, as_json: bool) -> None:
+    """Do the job behind a progress bar and print its summary."""
+    if as_json:
+        typer.echo(json.dumps(job(lambda step: None).as_json()))
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task(f"{scenario.name} (steps)", total=scenario.steps)
+        outcome = job(lambda step: bar.update(task, completed=step))
+        bar.update(task, completed=scenario.steps)
+    _print_summary(outcome)
+
+
+def _print_summary(outcome: Outcome) -> None:
+    summary = outcome.as_json()
+    exchange, gap = summary["exchange_us"], summary["joint_gap_max_m"]
+    rows = {
+        "steps": f"{summary['steps']}  ({summary['exchanges']} exchanges)",
+        "wall time": f"{summary['wall_s']:.2f} s",
+        "exchange time": f"{exchange['median']:.0f} µs median, {exchange['p99']:.0f} µs p99",
+        "largest joint gap": "no joints" if gap is None else f"{gap:.2g} m",
+        "largest aerodynamic force": f"{summary['force_max_N']:.4g} N",
+        "log": summary["log"],
+        "report": summary["report"],
+    }
+    for name, value in rows.items():
+        typer.echo(f"{name:>26}  {value}")

@@ -1,0 +1,206 @@
+"""The dynamics service: a coupling scheme drives the mechanism over the bus and keeps the log.
+
+What is expensive but not urgent, the log above all, is done between posting a motion and the answer to
+it, while the providers compute.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from linkwind.bus.base import DynamicsLink
+from linkwind.coupling import SCHEMES, Answer, CommunicationPoint, Settings
+from linkwind.dynamics.plant import MechanismPlant, State
+from linkwind.dynamics.recorder import Recorder
+from linkwind.errors import LostError
+from linkwind.mechanism import Mechanism
+from linkwind.protocol import DynamicsSession, fault
+from linkwind.scenario import Scenario
+from linkwind.spatial import Array, Motion
+
+GOODBYE_TIMEOUT = 5.0  # s that a provider may take to commit the last state and say Bye
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a run came to.
+
+    Attributes:
+        steps: macro steps done.
+        exchanges: motions answered.
+        wall_s: wall clock from the first to the last exchange [s].
+        exchange_us: wall clock of each exchange, from posting to the last answer [µs], shape (exchanges,).
+        joint_gap_max_m: largest distance of two joint points, from the poses; None without joints [m].
+        force_max_N: largest aerodynamic force on a body [N].
+        final_state_sha256: of the last accepted poses and twists, little-endian float64, body by body.
+    """
+
+    steps: int
+    exchanges: int
+    wall_s: float
+    exchange_us: Array
+    joint_gap_max_m: float | None
+    force_max_N: float  # noqa: N815  the unit's symbol
+    final_state_sha256: str
+
+
+class DynamicsService:
+    """One run of a scenario, from the dynamics' side."""
+
+    def __init__(self, scenario: Scenario, mechanism: Mechanism, run: str) -> None:
+        """Build the mechanism and the protocol's state; nothing is sent yet."""
+        self.session = DynamicsSession(
+            run=run,
+            scenario_json=scenario.to_json(),
+            step_ns=scenario.coupling.step_ns,
+            steps=scenario.steps,
+            bodies=mechanism.bodies,
+            providers={p.name: p.bodies for p in scenario.providers},
+        )
+        self._scenario = scenario
+        self._mechanism = mechanism
+        self._plant = MechanismPlant(mechanism, scenario)
+        n = len(mechanism.bodies)
+        self._wrench = np.zeros((n, 6))
+        self._added_inertia = np.zeros((n, 6, 6))
+        self._pending: deque[CommunicationPoint] = deque()
+        self._exchange_ns = np.zeros(scenario.steps + 1, dtype=np.int64)
+        self._exchanges = 0
+
+    def run(
+        self,
+        link: DynamicsLink,
+        recorder: Recorder,
+        progress: Callable[[int], None],
+        poll: Callable[[], None] = lambda: None,
+    ) -> Result:
+        """Wait for the providers, do every step, say goodbye.
+
+        Args:
+            link: an open end of the bus, answering control requests with :attr:`session`.
+            recorder: takes everything that is exchanged and accepted.
+            progress: is told now and then how many steps are done.
+            poll: is called now and then while waiting for the providers; may raise to give up.
+
+        Raises:
+            LostError: a provider did not come, died or was stopped.
+            AnswerTimeoutError, FaultError, ProtocolError, SimulationError: as they say.
+        """
+        self._link, self._recorder = link, recorder
+        try:
+            self._await_providers(poll)
+            start = time.perf_counter()
+            final = self._march(progress)
+            wall = time.perf_counter() - start
+            self._say_goodbye(final, poll)
+        except BaseException as error:
+            link.fault(fault("dynamics", self.session.motion.step, self.session.motion.iteration, error))
+            raise
+        return Result(
+            steps=self._scenario.steps,
+            exchanges=self._exchanges,
+            wall_s=wall,
+            exchange_us=self._exchange_ns[: self._exchanges] / 1e3,
+            joint_gap_max_m=recorder.joint_gap_max if self._mechanism.has_joints else None,
+            force_max_N=recorder.force_max,
+            final_state_sha256=self._digest(final),
+        )
+
+    def _await_providers(self, poll: Callable[[], None]) -> None:
+        timeout = self._scenario.bus.start_timeout
+        if not self._link.wait(lambda: not self.session.not_ready, timeout, poll):
+            missing = " and ".join(f'"{name}"' for name in self.session.not_ready)
+            raise LostError(
+                f"{missing} did not come within {timeout:g} s (bus.start_timeout). Start it with: "
+                f"linkwind aero --connect ENDPOINT --name {self.session.not_ready[0]}"
+            )
+        self._recorder.start(self.session.providers)
+
+    def _march(self, progress: Callable[[int], None]) -> State:
+        """Let the coupling scheme do every step; return the last state."""
+        scenario, mechanism = self._scenario, self._mechanism
+        settings = Settings(
+            weight=acceleration_weight(mechanism),
+            order=scenario.coupling.order,
+            adaptive=scenario.coupling.adaptive,
+            held=self.session.mean,
+        )
+        scheme = SCHEMES[scenario.coupling.scheme]
+        stride = max(1, scenario.steps // 200)
+        state = self._plant.initial
+        for point in scheme(self._plant, self._exchange, state, scenario.steps, settings):
+            # The scheme reuses its arrays; the log is written while the next answer is awaited.
+            self._pending.append(point._replace(wrench=point.wrench.copy()))
+            state = point.state
+            if point.step % stride == 0:
+                progress(point.step)
+        return state
+
+    def _exchange(self, step: int, iteration: int, accepted: State, trial: State) -> Answer:
+        """Post both states, write the log, return the sum of the providers' answers."""
+        session, link, motion = self.session, self._link, self.session.motion
+        self._plant.multibody.motion(accepted.values, motion.accepted)
+        self._plant.multibody.motion(trial.values, motion.trial)
+        payload = session.post(step, iteration)
+        start = time.perf_counter_ns()
+        link.post(payload)
+        self._write_pending()
+        self._recorder.motion(payload, motion.time_ns)
+        while not session.answered:
+            provider, answer = link.receive()
+            if session.accept(provider, answer):
+                self._recorder.wrench(provider, answer, motion.time_ns)
+        self._count(step, time.perf_counter_ns() - start)
+        has_added = session.total(self._wrench, self._added_inertia)
+        return Answer(self._wrench, self._added_inertia if has_added else None)
+
+    def _count(self, step: int, exchange_ns: int) -> None:
+        if self._exchanges == len(self._exchange_ns):
+            self._exchange_ns = np.concatenate([self._exchange_ns, np.zeros_like(self._exchange_ns)])
+        self._exchange_ns[self._exchanges] = exchange_ns
+        self._exchanges += 1
+        self._recorder.timing(step, self.session.motion.time_ns, exchange_ns)
+
+    def _write_pending(self) -> None:
+        while self._pending:
+            self._recorder.point(self._pending.popleft())
+
+    def _say_goodbye(self, final: State, poll: Callable[[], None]) -> None:
+        motion = self.session.motion
+        self._plant.multibody.motion(final.values, motion.accepted)
+        self._plant.multibody.motion(final.values, motion.trial)
+        payload = self.session.post(self._scenario.steps, 0, final=True)
+        self._link.post(payload)
+        self._write_pending()
+        self._recorder.motion(payload, motion.time_ns)
+        if not self._link.wait(lambda: not self.session.not_gone, GOODBYE_TIMEOUT, poll):
+            missing = " and ".join(f'"{name}"' for name in self.session.not_gone)
+            raise LostError(f"{missing} did not say Bye within {GOODBYE_TIMEOUT:g} s of the last step")
+
+    def _digest(self, final: State) -> str:
+        motion = Motion.at_rest(len(self._mechanism.bodies))
+        self._plant.multibody.motion(final.values, motion)
+        parts = [motion.position, motion.orientation, motion.linear, motion.angular]
+        return hashlib.sha256(np.hstack(parts).astype("<f8").tobytes()).hexdigest()
+
+
+def acceleration_weight(mechanism: Mechanism) -> Array:
+    """Return 1/mass and 1/(mean principal inertia) of the bodies [1/kg, 1/(kg·m²)], shape (n, 6).
+
+    Massless bodies count with the lightest mass that there is.
+    """
+    tables = mechanism.tables
+    mass = tables.mass
+    inertia = tables.inertia[:, :3].mean(axis=1)
+    weight = np.empty((len(mass), 6))
+    for columns, values in ((slice(0, 3), mass), (slice(3, 6), inertia)):
+        positive = values[values > 0.0]
+        floor = positive.min() if len(positive) else 1.0
+        weight[:, columns] = (1.0 / np.maximum(values, floor))[:, None]
+    return weight

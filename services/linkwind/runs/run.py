@@ -1,0 +1,156 @@
+"""One run: providers as processes of their own, the dynamics here, then the report."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+
+from linkwind.bus.base import DynamicsLink
+from linkwind.dynamics.recorder import Recorder
+from linkwind.dynamics.service import DynamicsService, Result
+from linkwind.errors import LinkwindError
+from linkwind.mechanism import build
+from linkwind.runs import folder as folders
+from linkwind.runs.children import children
+from linkwind.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A finished run.
+
+    Attributes:
+        scenario: its name.
+        result: what it came to.
+        log: the MCAP file.
+        report: the HTML page.
+    """
+
+    scenario: str
+    result: Result
+    log: Path
+    report: Path
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the outcome with the keys of ``linkwind run --json``."""
+        result = self.result
+        return {
+            "scenario": self.scenario,
+            "steps": result.steps,
+            "exchanges": result.exchanges,
+            "wall_s": result.wall_s,
+            "exchange_us": {
+                "median": float(np.median(result.exchange_us)),
+                "p99": float(np.percentile(result.exchange_us, 99)),
+            },
+            "joint_gap_max_m": result.joint_gap_max_m,
+            "force_max_N": result.force_max_N,
+            "final_state_sha256": result.final_state_sha256,
+            "log": str(self.log),
+            "report": str(self.report),
+        }
+
+
+Progress = Callable[[int], None]
+
+
+def run(scenario: Scenario, out: Path | None, progress: Progress) -> Outcome:
+    """Run ``scenario`` with every provider on this machine.
+
+    Args:
+        scenario: what to run.
+        out: folder for the results; None for a new one under ``runs/``.
+        progress: is told now and then how many steps are done.
+
+    Raises:
+        LinkwindError: the run ended early; its log and report tell as well.
+    """
+    folder = folders.create(scenario.name, out)
+    service = DynamicsService(scenario, build(scenario), folders.run_id(folder))
+    if scenario.bus.transport == "inprocess":
+        return _drive(scenario, service, folder, progress, lambda: _inprocess(service), lambda: None)
+    from linkwind.bus.zenoh import loopback_endpoint
+
+    with children(folder) as providers:
+        endpoint = loopback_endpoint()
+        for name in service.session.providers:
+            arguments = ["aero", "--connect", endpoint, "--name", name, "--run", service.session.run]
+            providers.start(name, [*arguments, "--start-timeout", str(scenario.bus.start_timeout)])
+        open_link = lambda: zenoh_link(service, scenario, [endpoint], [])  # noqa: E731
+        return _drive(scenario, service, folder, progress, open_link, providers.check)
+
+
+def dynamics(
+    scenario: Scenario, out: Path | None, progress: Progress, *, run_id: str, listen: Sequence[str], connect: Sequence[str]
+) -> Outcome:
+    """Run the dynamics alone; the providers come from elsewhere. See :func:`run`."""
+    folder = folders.create(scenario.name, out)
+    service = DynamicsService(scenario, build(scenario), run_id or folders.run_id(folder))
+    open_link = lambda: zenoh_link(service, scenario, listen, connect)  # noqa: E731
+    return _drive(scenario, service, folder, progress, open_link, lambda: None)
+
+
+def _drive(
+    scenario: Scenario,
+    service: DynamicsService,
+    folder: Path,
+    progress: Progress,
+    open_link: Callable[[], DynamicsLink],
+    poll: Callable[[], None],
+) -> Outcome:
+    """Run the service, close the log with how it ended, write the report either way."""
+    from linkwind.report import write_report
+
+    log, report = folder / "log.mcap", folder / "report.html"
+    try:
+        with terminate_as_interrupt(), Recorder(log, service.session.run, scenario) as recorder:
+            link = open_link()
+            try:
+                result = service.run(link, recorder, progress, poll)
+                recorder.complete(result.final_state_sha256)
+            finally:
+                link.close()
+    except LinkwindError as error:
+        if log.exists():
+            write_report(log, report)
+            raise type(error)(f"{error}\nlog: {log}\nreport: {report}") from error
+        raise
+    write_report(log, report)
+    return Outcome(scenario.name, result, log, report)
+
+
+def zenoh_link(
+    service: DynamicsService, scenario: Scenario, listen: Sequence[str], connect: Sequence[str]
+) -> DynamicsLink:
+    """Open the dynamics' end of a zenoh bus."""
+    from linkwind.bus.zenoh import ZenohDynamicsLink
+
+    return ZenohDynamicsLink(service.session, listen, connect, scenario.coupling.timeout)
+
+
+def _inprocess(service: DynamicsService) -> DynamicsLink:
+    from linkwind.aero.service import session
+    from linkwind.bus.inprocess import InProcessLink
+
+    return InProcessLink(service.session, [session(name) for name in service.session.providers])
+
+
+@contextmanager
+def terminate_as_interrupt() -> Iterator[None]:
+    """Let SIGTERM end the block the way Ctrl-C does, so that the log is closed and nobody is left waiting."""
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

@@ -1,0 +1,246 @@
+"""The zenoh transport: both ends in one process, over a real TCP connection on the loopback."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from linkwind.aero.service import serve
+from linkwind.bus.inprocess import InProcessLink
+from linkwind.bus.zenoh import ZenohDynamicsLink, ZenohProviderLink, loopback_endpoint
+from linkwind.errors import AnswerTimeoutError, FaultError, InputError, LostError, ProtocolError, RefusedError, SimulationError
+from linkwind.protocol import DynamicsSession, ProviderSession, fault
+from linkwind.spatial import Motion, Wrench
+
+from ..fakes import FakeModel
+
+STEP_NS = 1_000_000
+
+
+class Provider(threading.Thread):
+    """A provider that serves in a thread and remembers how it ended."""
+
+    def __init__(self, endpoint: str, model: FakeModel, name: str = "aero", start_timeout: float = 10.0) -> None:
+        super().__init__(daemon=True)
+        self.error: BaseException | None = None
+        self._arguments = (endpoint, model, name, start_timeout)
+        self.start()
+
+    def run(self) -> None:
+        endpoint, model, name, start_timeout = self._arguments
+        link = ZenohProviderLink([endpoint], [])
+        try:
+            serve(link, ProviderSession(name, lambda scenario, provider: model), start_timeout)
+        except BaseException as error:
+            self.error = error
+        finally:
+            link.close()
+
+
+def session(*names: str) -> DynamicsSession:
+    return DynamicsSession("r1", "{}", STEP_NS, 10, ["a", "b"], {name: ["a", "b"] for name in names or ("aero",)})
+
+
+@pytest.fixture
+def endpoint() -> str:
+    return loopback_endpoint()
+
+
+@pytest.fixture
+def open_link(endpoint: str) -> Iterator[Callable[..., ZenohDynamicsLink]]:
+    links: list[ZenohDynamicsLink] = []
+
+    def open_(d: DynamicsSession, timeout: float = 5.0) -> ZenohDynamicsLink:
+        links.append(ZenohDynamicsLink(d, [endpoint], [], timeout))
+        return links[-1]
+
+    yield open_
+    for link in links:
+        link.close()
+
+
+def exchange(d: DynamicsSession, link: ZenohDynamicsLink | InProcessLink, step: int) -> None:
+    link.post(d.post(step, 0))
+    while not d.answered:
+        d.accept(*link.receive())
+
+
+def finish(d: DynamicsSession, link: ZenohDynamicsLink | InProcessLink) -> None:
+    link.post(d.post(10, 0, final=True))
+    assert link.wait(lambda: not d.not_gone, 10.0, lambda: None)
+
+
+def march(d: DynamicsSession, link: ZenohDynamicsLink | InProcessLink) -> bytes:
+    """Run ten steps of velocity-dependent forces; return every wrench, as bytes."""
+    rng = np.random.default_rng(1)
+    wrenches = []
+    for step in range(11):
+        d.motion.trial.linear[:] = rng.normal(size=(2, 3))
+        exchange(d, link, step)
+        wrench = np.zeros((2, 6))
+        d.total(wrench, np.zeros((2, 6, 6)))
+        wrenches.append(wrench.tobytes())
+    finish(d, link)
+    return b"".join(wrenches)
+
+
+def test_zenoh_and_inprocess_give_the_same_bits(endpoint: str, open_link: Callable[..., ZenohDynamicsLink]) -> None:
+    d = session("one", "two")
+    link = open_link(d)
+    providers = [Provider(endpoint, FakeModel(value=i), name) for i, name in enumerate(("one", "two"))]
+    assert link.wait(lambda: not d.not_ready, 10.0, lambda: None)
+    over_zenoh = march(d, link)
+    for provider in providers:
+        provider.join(10.0)
+        assert provider.error is None
+
+    d = session("one", "two")
+    models = [
+        ProviderSession(name, lambda s, n, i=i: FakeModel(value=i)) for i, name in enumerate(("one", "two"))
+    ]
+    assert march(d, InProcessLink(d, models)) == over_zenoh
+
+
+def test_provider_may_start_before_the_dynamics(endpoint: str, open_link: Callable[..., ZenohDynamicsLink]) -> None:
+    provider = Provider(endpoint, FakeModel())
+    d = session()
+    link = open_link(d)
+    assert link.wait(lambda: not d.not_ready, 10.0, lambda: None)
+    march(d, link)
+    provider.join(10.0)
+    assert provider.error is None
+
+
+def test_no_dynamics_is_an_error_within_the_start_timeout(endpoint: str) -> None:
+    provider = Provider(endpoint, FakeModel(), start_timeout=0.3)
+    provider.join(10.0)
+    assert isinstance(provider.error, LostError)
+    assert f"no dynamics answered at {endpoint} within 0.3 s" in str(provider.error)
+
+
+def test_second_provider_of_a_name_is_refused_and_the_run_goes_on(
+    endpoint: str, open_link: Callable[..., ZenohDynamicsLink]
+) -> None:
+    d = session()
+    link = open_link(d)
+    first = Provider(endpoint, FakeModel())
+    assert link.wait(lambda: not d.not_ready, 10.0, lambda: None)
+    exchange(d, link, 0)
+    second = Provider(endpoint, FakeModel())
+    second.join(10.0)
+    assert isinstance(second.error, RefusedError)
+    assert 'a participant named "aero" already takes part' in str(second.error)
+    for step in range(1, 11):
+        exchange(d, link, step)
+    finish(d, link)
+    first.join(10.0)
+    assert first.error is None
+
+
+def test_endpoint_in_use_is_an_error_that_says_so(endpoint: str, open_link: Callable[..., ZenohDynamicsLink]) -> None:
+    open_link(session())
+    with pytest.raises(InputError, match=f"cannot listen on {endpoint}.*Is another dynamics running there"):
+        open_link(session())
+
+
+def test_silent_provider_is_told_from_a_lost_one(endpoint: str, open_link: Callable[..., ZenohDynamicsLink]) -> None:
+    release = threading.Event()
+
+    class Stuck(FakeModel):
+        def evaluate(self, t: float, motion: Motion, wrench: Wrench) -> None:
+            if t > 0.0:
+                release.wait(10.0)
+
+    d = session()
+    link = open_link(d, timeout=0.3)
+    provider = Provider(endpoint, Stuck())
+    assert link.wait(lambda: not d.not_ready, 10.0, lambda: None)
+    exchange(d, link, 0)
+    with pytest.raises(AnswerTimeoutError, match=r'no Wrench from "aero" for step 1 \(t = 0.001 s\) within 0.3 s; it is alive'):
+        exchange(d, link, 1)
+    link.fault(fault("dynamics", 1, 0, AnswerTimeoutError("too late")))
+    release.set()
+    provider.join(10.0)
+    assert isinstance(provider.error, FaultError)
+    assert str(provider.error) == '"dynamics" stopped at step 1: AnswerTimeoutError: too late'
+
+
+def test_failing_model_ends_the_run_with_its_reason(endpoint: str, open_link: Callable[..., ZenohDynamicsLink]) -> None:
+    model = FakeModel()
+    d = session()
+    link = open_link(d)
+    provider = Provider(endpoint, model)
+    assert link.wait(lambda: not d.not_ready, 10.0, lambda: None)
+    exchange(d, link, 0)
+    model.poison = ("force", 1, np.nan)
+    with pytest.raises(FaultError, match=r'"aero" stopped at step 1: SimulationError: .*force on b.*nan'):
+        exchange(d, link, 1)
+    provider.join(10.0)
+    assert isinstance(provider.error, SimulationError)
+
+
+def test_model_that_cannot_be_built_ends_the_hand_shake(
+    endpoint: str, open_link: Callable[..., ZenohDynamicsLink]
+) -> None:
+    class Unbuildable(FakeModel):
+        def save(self) -> bytes:
+            raise SimulationError("no such wing")
+
+    d = session()
+    link = open_link(d)
+    provider = Provider(endpoint, Unbuildable())
+    with pytest.raises(FaultError, match="no such wing"):
+        link.wait(lambda: not d.not_ready, 10.0, lambda: None)
+    provider.join(10.0)
+    assert isinstance(provider.error, SimulationError)
+
+
+def test_dynamics_that_leaves_is_noticed(endpoint: str) -> None:
+    d = session()
+    link = ZenohDynamicsLink(d, [endpoint], [], 5.0)
+    provider = Provider(endpoint, FakeModel())
+    assert link.wait(lambda: not d.not_ready, 10.0, lambda: None)
+    exchange(d, link, 0)
+    link.close()
+    provider.join(10.0)
+    assert isinstance(provider.error, LostError)
+    assert "the dynamics was lost" in str(provider.error)
+
+
+@pytest.mark.parametrize(
+    ("name", "payload", "expected"),
+    [
+        ("stranger", b"x", 'wrench from "stranger": it does not take part in run r1'),
+        ("aero", b"nonsense", 'wrench from "aero": expected a WrenchStep of this run'),
+    ],
+)
+def test_nonsense_on_a_wrench_key_is_an_error_with_a_name(
+    endpoint: str, open_link: Callable[..., ZenohDynamicsLink], name: str, payload: bytes, expected: str
+) -> None:
+    class Slow(FakeModel):
+        def evaluate(self, t: float, motion: Motion, wrench: Wrench) -> None:
+            if t > 0.0:
+                asked.set()
+                release.wait(10.0)
+
+    asked, release = threading.Event(), threading.Event()
+    d = session()
+    link = open_link(d)
+    provider = Provider(endpoint, Slow())
+    assert link.wait(lambda: not d.not_ready, 10.0, lambda: None)
+    stranger = ZenohProviderLink([endpoint], [])
+    stranger.join("r1", name)
+    exchange(d, link, 0)
+    link.post(d.post(1, 0))
+    assert asked.wait(10.0)
+    stranger.reply(payload)
+    with pytest.raises(ProtocolError, match=expected) as error:
+        d.accept(*link.receive())
+    link.fault(fault("dynamics", 1, 0, error.value))
+    release.set()
+    provider.join(10.0)
+    assert isinstance(provider.error, FaultError)
+    stranger.close()

@@ -1,0 +1,303 @@
+"""The lock-step protocol without a network: both state machines, message by message."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from linkwind.errors import FaultError, ProtocolError, RefusedError, SimulationError
+from linkwind.protocol import DynamicsSession, ProviderSession, ProviderState, fault_error
+from linkwind.schema import MESSAGES, SHA256
+
+from ..fakes import FakeModel
+
+Control = MESSAGES["Control"]
+STEP_NS = 1_000_000
+
+
+def dynamics(**providers: list[str]) -> DynamicsSession:
+    return DynamicsSession("r1", "{}", STEP_NS, 10, ["a", "b"], providers or {"aero": ["a", "b"]})
+
+
+def provider(model: FakeModel | None = None, name: str = "aero") -> ProviderSession:
+    made = model or FakeModel()
+    return ProviderSession(name, lambda scenario_json, name: made)
+
+
+def shake_hands(d: DynamicsSession, p: ProviderSession) -> None:
+    p.welcome(d.control(p.hello()))
+    p.build()
+    p.started(d.control(p.ready()))
+
+
+@pytest.fixture
+def pair() -> tuple[DynamicsSession, ProviderSession, FakeModel]:
+    model = FakeModel()
+    d, p = dynamics(), provider(model)
+    shake_hands(d, p)
+    return d, p, model
+
+
+def exchange(d: DynamicsSession, p: ProviderSession, step: int, iteration: int = 0) -> bytes:
+    answer = p.answer(d.post(step, iteration))
+    assert answer is not None
+    assert d.accept(p.name, answer)
+    return answer
+
+
+def reason(reply: bytes) -> str:
+    return str(Control.FromString(reply).refuse.reason)
+
+
+def test_hand_shake_names_bodies_and_steps() -> None:
+    d, p = dynamics(aero=["b"]), provider()
+    welcome = Control.FromString(d.control(p.hello())).welcome
+    assert (welcome.run, welcome.step_ns, welcome.steps) == ("r1", STEP_NS, 10)
+    assert list(welcome.bodies) == ["a", "b"]
+    assert list(welcome.provider_bodies) == ["b"]
+    assert d.not_ready == ["aero"]
+    shake_hands(d, p)
+    assert d.not_ready == []
+    assert p.state is ProviderState.RUNNING
+
+
+def test_step_zero_commits_nothing_and_gives_the_first_wrench(pair: tuple[DynamicsSession, ProviderSession, FakeModel]) -> None:
+    d, p, model = pair
+    d.motion.trial.linear[:] = [[1, 2, 3], [4, 5, 6]]
+    exchange(d, p, 0)
+    assert model.calls == [("evaluate", 0.0)]
+    wrench, added = np.zeros((2, 6)), np.zeros((2, 6, 6))
+    assert d.total(wrench, added) is False
+    assert wrench[:, :3].tolist() == [[-1, -2, -3], [-4, -5, -6]]  # FakeModel: force = −velocity
+
+
+def test_order_of_exchange(pair: tuple[DynamicsSession, ProviderSession, FakeModel]) -> None:
+    d, p, model = pair
+    for step in range(3):
+        exchange(d, p, step)
+    assert model.calls == [
+        ("evaluate", 0.0),
+        ("commit", 0.0),
+        ("evaluate", 0.001),
+        ("commit", 0.001),
+        ("evaluate", 0.002),
+    ]
+
+
+def test_iteration_goes_back_to_the_committed_state(pair: tuple[DynamicsSession, ProviderSession, FakeModel]) -> None:
+    d, p, model = pair
+    exchange(d, p, 0)
+    exchange(d, p, 1)
+    saved = model.blobs[-1]
+    exchange(d, p, 1, iteration=1)
+    assert model.calls[-2:] == [("restore", saved), ("evaluate", 0.001)]
+
+
+def test_iteration_without_rollback_is_refused() -> None:
+    d, p = dynamics(), provider(FakeModel(rollback=False))
+    shake_hands(d, p)
+    exchange(d, p, 0)
+    exchange(d, p, 1)
+    with pytest.raises(ProtocolError, match="iteration 1 asked, but it cannot roll back"):
+        p.answer(d.post(1, 1))
+
+
+def test_repeated_motion_is_answered_from_memory(pair: tuple[DynamicsSession, ProviderSession, FakeModel]) -> None:
+    d, p, model = pair
+    first = exchange(d, p, 0)
+    calls = list(model.calls)
+    assert p.answer(d.post(0, 0)) == first
+    assert model.calls == calls
+
+
+def test_stale_motion_is_dropped_and_leaves_no_trace(
+    pair: tuple[DynamicsSession, ProviderSession, FakeModel], caplog: pytest.LogCaptureFixture
+) -> None:
+    d, p, model = pair
+    old = d.post(0, 0)
+    exchange(d, p, 0)
+    exchange(d, p, 1)
+    calls = list(model.calls)
+    assert p.answer(old) is None
+    assert model.calls == calls
+    assert "stale" in caplog.text
+    exchange(d, p, 2)
+
+
+@pytest.mark.parametrize(("step", "iteration"), [(2, 0), (1, 1), (5, 0)])
+def test_gap_is_an_error(pair: tuple[DynamicsSession, ProviderSession, FakeModel], step: int, iteration: int) -> None:
+    d, p, _ = pair
+    exchange(d, p, 0)
+    with pytest.raises(ProtocolError, match=f"expected step 1 iteration 0; got step {step}"):
+        p.answer(d.post(step, iteration))
+
+
+def test_end_commits_the_last_state_and_says_bye(pair: tuple[DynamicsSession, ProviderSession, FakeModel]) -> None:
+    d, p, model = pair
+    exchange(d, p, 0)
+    assert p.answer(d.post(10, 0, final=True)) is None
+    assert model.calls[-1] == ("commit", 0.01)
+    assert p.state is ProviderState.DONE
+    assert d.not_gone == ["aero"]
+    d.control(p.bye())
+    assert d.not_gone == []
+    assert d.answered or d.unanswered == []
+
+
+def test_second_participant_of_a_name_is_refused_and_the_first_goes_on(
+    pair: tuple[DynamicsSession, ProviderSession, FakeModel],
+) -> None:
+    d, p, _ = pair
+    exchange(d, p, 0)
+    with pytest.raises(RefusedError, match='a participant named "aero" already takes part in run r1'):
+        provider().welcome(d.control(provider().hello()))
+    assert d.failure is None
+    exchange(d, p, 1)
+
+
+def test_hello_may_be_repeated_by_the_same_process() -> None:
+    d, p = dynamics(), provider()
+    assert d.control(p.hello()) == d.control(p.hello())
+
+
+def test_unknown_name_is_refused() -> None:
+    d = dynamics()
+    with pytest.raises(RefusedError, match='participant "wing": expected one of aero'):
+        provider().welcome(d.control(provider(name="wing").hello()))
+    assert d.failure is None
+
+
+def test_other_schema_ends_the_run_on_both_sides() -> None:
+    d = dynamics()
+    hello = {"name": "aero", "schema_sha256": "0" * 64, "version": "0.0.1", "instance": "x"}
+    reply = d.control(Control(hello=hello).SerializeToString())
+    assert f"expected schema {SHA256[:12]}" in reason(reply)
+    assert "got 000000000000 (linkwind 0.0.1)" in reason(reply)
+    assert isinstance(d.failure, RefusedError)
+
+
+@pytest.mark.parametrize("request_", [b"", b"\xff\xff\xff", b"hello", Control(start={}).SerializeToString()])
+def test_nonsense_on_control_is_refused(request_: bytes) -> None:
+    d = dynamics()
+    assert "control: expected" in reason(d.control(request_))
+
+
+def test_ready_without_hello_is_refused() -> None:
+    d = dynamics()
+    assert "Ready without Hello" in reason(d.control(Control(ready={"name": "aero"}).SerializeToString()))
+    assert d.not_ready == ["aero"]
+
+
+def test_response_matrix_is_refused_rather_than_ignored() -> None:
+    d, p = dynamics(), provider(FakeModel(response_size=72))
+    p.welcome(d.control(p.hello()))
+    p.build()
+    with pytest.raises(RefusedError, match="response matrix G"):
+        p.started(d.control(p.ready()))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("where", ["force", "torque", "added_inertia"])
+def test_wrench_that_is_not_finite_names_provider_body_and_step(bad: float, where: str) -> None:
+    model = FakeModel(added_inertia=True)
+    d, p = dynamics(), provider(model)
+    shake_hands(d, p)
+    exchange(d, p, 0)
+    model.poison = (where, 1, bad)
+    with pytest.raises(SimulationError, match=rf'"aero": step 1 \(t = 0.001 s\): {where} on b: expected finite'):
+        p.answer(d.post(1, 0))
+
+
+def test_dynamics_checks_numbers_itself(pair: tuple[DynamicsSession, ProviderSession, FakeModel]) -> None:
+    d, p, _ = pair
+    exchange(d, p, 0)
+    d.post(1, 0)
+    message = MESSAGES["WrenchStep"](
+        run="r1", provider="aero", step=1, iteration=0, time_ns=STEP_NS, kind=1, force=[np.nan] * 6, torque=[0.0] * 6
+    )
+    with pytest.raises(SimulationError, match="force on a"):
+        d.accept("aero", message.SerializeToString())
+
+
+def test_wrench_of_the_future_is_an_error_and_of_the_past_is_dropped(
+    pair: tuple[DynamicsSession, ProviderSession, FakeModel],
+) -> None:
+    d, p, _ = pair
+    first = exchange(d, p, 0)
+    d.motion.trial.linear[:] = 7.0
+    answer = p.answer(d.post(1, 0))
+    assert answer is not None
+    assert d.accept("aero", first) is False
+    assert not d.answered
+    assert d.accept("aero", answer) is True
+    assert d.answered
+    # A late repetition must not overwrite the numbers that were accepted.
+    assert d.accept("aero", first) is False
+    wrench = np.zeros((2, 6))
+    d.total(wrench, np.zeros((2, 6, 6)))
+    assert (wrench[:, :3] == -7.0).all()
+    d.post(0, 0)
+    with pytest.raises(ProtocolError, match="expected step 0 iteration 0; got step 1"):
+        d.accept("aero", answer)
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda m: m.update(run="other"),
+        lambda m: m.update(provider="wing"),
+        lambda m: m.update(force=[0.0] * 9),
+        lambda m: m.update(torque=[]),
+        lambda m: m.update(kind=2),
+    ],
+    ids=["run", "provider", "too many", "missing", "kind"],
+)
+def test_wrench_of_another_run_provider_or_size_is_an_error(
+    pair: tuple[DynamicsSession, ProviderSession, FakeModel], spoil: Callable[[dict[str, object]], None]
+) -> None:
+    d, _, _ = pair
+    d.post(0, 0)
+    fields: dict[str, object] = {
+        "run": "r1",
+        "provider": "aero",
+        "step": 0,
+        "iteration": 0,
+        "time_ns": 0,
+        "kind": 1,
+        "force": [0.0] * 6,
+        "torque": [0.0] * 6,
+    }
+    assert d.accept("aero", MESSAGES["WrenchStep"](**fields).SerializeToString())
+    d.post(0, 0)
+    spoil(fields)
+    with pytest.raises(ProtocolError, match='wrench from "aero": expected a WrenchStep of this run'):
+        d.accept("aero", MESSAGES["WrenchStep"](**fields).SerializeToString())
+
+
+def test_answers_of_several_providers_add_up_in_scenario_order() -> None:
+    d = DynamicsSession("r1", "{}", STEP_NS, 10, ["a", "b", "c"], {"one": ["c", "a"], "two": ["b", "c"]})
+    one, two = provider(FakeModel(value=1.0, added_inertia=True), "one"), provider(FakeModel(value=10.0), "two")
+    shake_hands(d, one)
+    shake_hands(d, two)
+    motion = d.post(0, 0)
+    for p in (two, one):
+        answer = p.answer(motion)
+        assert answer is not None
+        d.accept(p.name, answer)
+    wrench, added = np.zeros((3, 6)), np.ones((3, 6, 6))
+    assert d.total(wrench, added) is True
+    assert wrench[:, 3].tolist() == [1.0, 10.0, 11.0]  # FakeModel: torque x = value
+    assert added[:, 0, 0].tolist() == [1.0, 0.0, 1.0]
+
+
+def test_fault_names_participant_step_and_cause(pair: tuple[DynamicsSession, ProviderSession, FakeModel]) -> None:
+    d, p, _ = pair
+    exchange(d, p, 0)
+    exchange(d, p, 1)
+    d.control(p.fault(SimulationError("alpha is out of range")))
+    assert isinstance(d.failure, FaultError)
+    assert str(d.failure) == '"aero" stopped at step 1: SimulationError: alpha is out of range'
+    with pytest.raises(ProtocolError, match="control: expected one of fault"):
+        raise fault_error(p.hello())
