@@ -1,0 +1,260 @@
+/* The integrators: README, section Integrators. The vector y is (q, v, work, dissipated). */
+#include "lw_model.h"
+#include "lw_polynomial.h"
+
+#include <string.h>
+
+/* One macro step in progress. */
+typedef struct {
+    lw_multibody *mb;
+    lw_polynomial wrench;
+    const double *wrenches;
+    double h;            /* macro step [s] */
+    int32_t substeps;
+    double rtol, atol;
+    double proposed;     /* substep [s] that dopri5 would take next */
+    lw_fault *fault;
+} lw_run;
+
+static int length(const lw_multibody *mb) { return mb->nq + mb->nv + 2; }
+
+static const double *wrench_at(lw_run *run, double s) {
+    if (run->wrench.count == 1) return run->wrenches;
+    lw_polynomial_value(&run->wrench, s, 6 * run->mb->n, run->wrenches, run->mb->wrench);
+    return run->mb->wrench;
+}
+
+/* dy/dt at `s`, in units of the macro step. */
+static int derive(lw_run *run, double s, const double *y, double *rate) {
+    lw_multibody *mb = run->mb;
+    const double *wrench = wrench_at(run, s), *v = y + mb->nq;
+    int status = lw_accelerations(mb, y, v, wrench, rate + mb->nq, run->fault);
+    if (status) {
+        run->fault->time = s * run->h;
+        return status;
+    }
+    lw_coordinate_rate(mb, y, v, rate);
+    rate[mb->nq + mb->nv] = lw_wrench_power(mb, wrench);
+    rate[mb->nq + mb->nv + 1] = lw_damper_power(mb, v);
+    return LW_OK;
+}
+
+static int overflowed(const double *values, int first, int count) {
+    for (int k = first; k < first + count; ++k)
+        if (!isfinite(values[k])) return 1;
+    return 0;
+}
+
+/* Every accepted substep ends here: unit quaternions, finite numbers. */
+static int settle(lw_run *run, double *y, double s) {
+    const lw_multibody *mb = run->mb;
+    lw_coordinate_normalise(mb, y);
+    for (int i = 0; i < mb->n; ++i) {
+        const lw_link *l = &mb->link[i];
+        if (!overflowed(y, l->q, lw_joint_nq(l->type)) && !overflowed(y, mb->nq + l->v, l->columns)) continue;
+        run->fault->item = l->body;
+        run->fault->time = s * run->h;
+        return LW_NOT_FINITE;
+    }
+    return LW_OK;
+}
+
+/* ---- explicit Runge-Kutta methods ---- */
+
+typedef struct {
+    int stages;
+    double a[LW_MAX_STAGES][LW_MAX_STAGES - 1], b[LW_MAX_STAGES], c[LW_MAX_STAGES];
+} lw_tableau;
+
+/* Forward Euler: everything moves with what it is at the start. */
+static const lw_tableau euler = {1, {{0.0}}, {1.0}, {0.0}};
+
+/* W. Kutta 1901; E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.1. */
+static const lw_tableau rk4 = {4,
+                               {{0.0}, {0.5}, {0.0, 0.5}, {0.0, 0.0, 1.0}},
+                               {1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0},
+                               {0.0, 0.5, 0.5, 1.0}};
+
+/* J. R. Dormand, P. J. Prince 1980, doi:10.1016/0771-050X(80)90013-3. Its last row is its weights, so the
+ * seventh stage is the first of the next substep. */
+static const lw_tableau dopri5 = {
+    7,
+    {{0.0},
+     {1.0 / 5.0},
+     {3.0 / 40.0, 9.0 / 40.0},
+     {44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0},
+     {19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0},
+     {9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0},
+     {35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0}},
+    {35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0, 0.0},
+    {0.0, 1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0, 1.0}};
+
+/* Weights of order 5 minus weights of order 4. */
+static const double dopri5_error[7] = {71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0,
+                                       -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0};
+
+/* sum = y + h * (weights . rates) */
+static void combine(const lw_multibody *mb, int count, const double *weights, double h, double *sum) {
+    int size = length(mb);
+    memcpy(sum, mb->y, (size_t)size * sizeof(double));
+    for (int j = 0; j < count; ++j) {
+        if (weights[j] == 0.0) continue;
+        double factor = h * weights[j];
+        const double *rate = mb->rate[j];
+        for (int k = 0; k < size; ++k) sum[k] += factor * rate[k];
+    }
+}
+
+/* The rates from stage `first` on, for a substep of `h` [s] from `s`; `width` is h in macro steps. */
+static int stages(lw_run *run, const lw_tableau *t, int first, double s, double width, double h) {
+    lw_multibody *mb = run->mb;
+    for (int i = first; i < t->stages; ++i) {
+        const double *y = mb->y;
+        if (i > 0) {
+            combine(mb, i, t->a[i], h, mb->trial);
+            y = mb->trial;
+        }
+        int status = derive(run, s + t->c[i] * width, y, mb->rate[i]);
+        if (status) return status;
+    }
+    return LW_OK;
+}
+
+static int runge_kutta(lw_run *run, const lw_tableau *t) {
+    lw_multibody *mb = run->mb;
+    double h = run->h / run->substeps, width = 1.0 / run->substeps;
+    for (int32_t k = 0; k < run->substeps; ++k) {
+        int status = stages(run, t, 0, k * width, width, h);
+        if (status) return status;
+        combine(mb, t->stages, t->b, h, mb->y);
+        if ((status = settle(run, mb->y, (k + 1) * width))) return status;
+    }
+    return LW_OK;
+}
+
+/* ---- semi-implicit Euler: the position moves with the new velocity ---- */
+
+static int semi_implicit_euler(lw_run *run) {
+    lw_multibody *mb = run->mb;
+    double h = run->h / run->substeps, width = 1.0 / run->substeps;
+    for (int32_t k = 0; k < run->substeps; ++k) {
+        double *y = mb->y, *rate = mb->rate[0];
+        int status = derive(run, k * width, y, rate);
+        if (status) return status;
+        for (int i = mb->nq; i < length(mb); ++i) y[i] += h * rate[i];
+        lw_coordinate_rate(mb, y, y + mb->nq, rate);
+        for (int i = 0; i < mb->nq; ++i) y[i] += h * rate[i];
+        if ((status = settle(run, y, (k + 1) * width))) return status;
+    }
+    return LW_OK;
+}
+
+/* ---- Dormand-Prince 5(4) with error control ---- */
+
+/* Root mean square of the estimated error in units of the tolerance, over q and v. The result of the
+ * step is in `trial`. */
+static double error_norm(const lw_run *run, double h) {
+    const lw_multibody *mb = run->mb;
+    int size = mb->nq + mb->nv;
+    double sum = 0.0;
+    for (int k = 0; k < size; ++k) {
+        double error = 0.0, larger = fmax(fabs(mb->y[k]), fabs(mb->trial[k]));
+        for (int j = 0; j < 7; ++j) error += dopri5_error[j] * mb->rate[j][k];
+        error *= h / (run->atol + run->rtol * larger);
+        sum += error * error;
+    }
+    return size ? sqrt(sum / size) : 0.0;
+}
+
+/* Factor from one substep to the next; a norm that is not a number shrinks the step. */
+static double step_factor(double norm) {
+    if (!(norm < HUGE_VAL)) return 0.2;
+    if (norm == 0.0) return 5.0;
+    return fmin(5.0, fmax(0.2, 0.9 * pow(norm, -0.2)));
+}
+
+/* Take the trial as the state; its rate is known from the last stage, but for the normalised part. */
+static int accept(lw_run *run, double time) {
+    lw_multibody *mb = run->mb;
+    memcpy(mb->y, mb->trial, (size_t)length(mb) * sizeof(double));
+    double *last = mb->rate[6];
+    mb->rate[6] = mb->rate[0];
+    mb->rate[0] = last;
+    int status = settle(run, mb->y, time / run->h);
+    lw_coordinate_rate(mb, mb->y, mb->y + mb->nq, mb->rate[0]);
+    return status;
+}
+
+static int dormand_prince(lw_run *run) {
+    lw_multibody *mb = run->mb;
+    double time = 0.0, h = run->h, limit = run->h / run->substeps, largest = 5.0;
+    double next = run->proposed > 0.0 ? fmin(run->proposed, limit) : limit;
+    int status = derive(run, 0.0, mb->y, mb->rate[0]);
+    if (run->proposed <= 0.0) run->proposed = next;
+    while (!status && time < h) {
+        int last = time + 1.01 * next >= h;
+        double step = last ? h - time : next;
+        if (step < 1e-13 * h) {
+            run->fault->time = time;
+            return LW_STEP_UNDERFLOW;
+        }
+        status = stages(run, &dopri5, 1, time / h, step / h, step);
+        if (status && status != LW_NOT_FINITE) return status; /* an overflow is too long a step */
+        double norm = status ? HUGE_VAL : error_norm(run, step), factor = step_factor(norm);
+        int clipped = factor >= largest;
+        next = step * fmin(factor, largest);
+        largest = norm <= 1.0 ? 5.0 : 1.0; /* no growth right after a rejection */
+        status = LW_OK;
+        if (norm <= 1.0) {
+            /* A step cut short by the end of the macro step says nothing against a longer one. */
+            run->proposed = last && clipped ? fmax(next, run->proposed) : next;
+            time = last ? h : time + step;
+            status = accept(run, time);
+        } else {
+            run->proposed = next;
+        }
+    }
+    return status;
+}
+
+/* ---- one macro step ---- */
+
+static int check_arguments(lw_run *run, int32_t count, const double *nodes) {
+    if (!(run->h > 0.0) || !isfinite(run->h)) return LW_BAD_STEP;
+    if (run->substeps < 1) return LW_BAD_SUBSTEPS;
+    if (lw_polynomial_init(&run->wrench, count, nodes)) return LW_BAD_NODES;
+    return LW_OK;
+}
+
+static int integrate(lw_run *run, int32_t integrator) {
+    switch (integrator) {
+    case LW_EULER: return runge_kutta(run, &euler);
+    case LW_SEMI_IMPLICIT_EULER: return semi_implicit_euler(run);
+    case LW_RK4: return runge_kutta(run, &rk4);
+    case LW_DOPRI5:
+        if (!(run->rtol >= 0.0 && run->atol > 0.0)) return LW_BAD_TOLERANCE;
+        return dormand_prince(run);
+    default: return LW_BAD_INTEGRATOR;
+    }
+}
+
+int lw_multibody_advance(lw_multibody *mb, const double *state, double h, int32_t count,
+                         const double *nodes, const double *wrenches, const double *added_inertia,
+                         int32_t integrator, int32_t substeps, double rtol, double atol, double *next,
+                         double *work, lw_fault *fault) {
+    lw_run run = {.mb = mb, .wrenches = wrenches, .h = h, .substeps = substeps, .rtol = rtol, .atol = atol,
+                  .fault = fault};
+    size_t coordinates = (size_t)(mb->nq + mb->nv) * sizeof(double);
+    int status = check_arguments(&run, count, nodes);
+    if (!status) status = lw_inputs_check(mb, state, count, wrenches, added_inertia, fault);
+    if (status) return status;
+    run.proposed = state[mb->nq + mb->nv];
+    lw_bind_added(mb, added_inertia);
+    memcpy(mb->y, state, coordinates);
+    mb->y[mb->nq + mb->nv] = mb->y[mb->nq + mb->nv + 1] = 0.0;
+    if ((status = integrate(&run, integrator))) return status;
+    memcpy(next, mb->y, coordinates);
+    next[mb->nq + mb->nv] = run.proposed;
+    memcpy(work, mb->y + mb->nq + mb->nv, 2 * sizeof(double));
+    return LW_OK;
+}

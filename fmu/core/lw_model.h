@@ -1,0 +1,81 @@
+/* The mechanism in memory, for the files of this folder. */
+#ifndef LW_MODEL_H
+#define LW_MODEL_H
+
+#include "lw_multibody.h"
+
+typedef struct { lw_vec3 linear, angular; } lw_spatial; /* twist, acceleration, or (force, torque) */
+
+/* Symmetric 6x6 inertia [[m, h], [hᵀ, j]]: force = m a + h α, torque = hᵀ a + j α. */
+typedef struct {
+    lw_sym3 m, j;
+    lw_mat3 h;
+} lw_inertia6;
+
+/* One degree of freedom of a joint: its motion vector s, and what its elimination leaves behind. */
+typedef struct {
+    lw_spatial s;           /* motion of the child's COM per unit of velocity, in W */
+    lw_spatial u;           /* articulated inertia times s */
+    double force, inverse;  /* net generalised force; 1 / (s . u) */
+} lw_column;
+
+/* A body, and the joint that carries it. */
+typedef struct {
+    /* constant */
+    int32_t body, parent; /* row of the tables; link of the parent, -1 = world */
+    int32_t type, q, v, translations, columns;
+    int32_t parent_rotated, child_rotated, sprung, damped;
+    lw_vec3 parent_point, child_point, axis; /* axis: the joint's z in the parent's body frame */
+    lw_quat parent_quat, child_quat_inverse;
+    lw_mat3 parent_matrix, child_matrix;
+    double mass;
+    lw_sym3 inertia;
+    const double *added; /* of the present evaluation, NULL if there is none or it is zero */
+    /* kinematics, in W */
+    lw_quat orientation;
+    lw_mat3 rotation;
+    lw_vec3 position, offset, arm; /* COM; COM from the parent's COM; COM from the joint's point */
+    lw_spatial velocity, bias;     /* bias: acceleration that is left with zero parent and joint ones */
+    /* dynamics, in W at the COM */
+    lw_inertia6 articulated;
+    lw_spatial bias_force; /* reaction of the joint for zero acceleration */
+    lw_spatial acceleration;
+    double mass_scale, inertia_scale; /* size of the terms that a pivot is the difference of */
+    lw_column column[6];
+} lw_link;
+
+enum { LW_MAX_STAGES = 7 };
+
+struct lw_multibody {
+    int32_t n, nq, nv;
+    lw_vec3 gravity;
+    lw_link *link; /* n, in topological order */
+    double *stiffness, *damping, *rest;
+    double *wrench;                 /* (n,6) at the time of a stage */
+    double *y, *trial, *rate[LW_MAX_STAGES]; /* q, v, work, dissipated: state, stage, derivatives */
+};
+
+/* lw_tables.c */
+int lw_tables_check(const lw_tables *tables, lw_fault *fault);
+/* lw_kinematics.c: poses, velocities, motion vectors and bias accelerations of all links. */
+void lw_kinematics(lw_multibody *multibody, const double *q, const double *v);
+/* lw_coordinates.c */
+void lw_coordinate_rate(const lw_multibody *multibody, const double *q, const double *v, double *rate);
+void lw_coordinate_normalise(const lw_multibody *multibody, double *q);
+lw_vec3 lw_rotation_vector(lw_quat q);
+/* lw_springs.c */
+void lw_joint_force(const lw_multibody *multibody, const lw_link *link, const double *q, const double *v,
+                    double *force);
+double lw_spring_energy(const lw_multibody *multibody, const double *q);
+double lw_damper_power(const lw_multibody *multibody, const double *v);
+/* lw_dynamics.c: set the added inertia of the coming evaluations; accelerations; power of the wrench. */
+void lw_bind_added(lw_multibody *multibody, const double *added_inertia);
+int lw_accelerations(lw_multibody *multibody, const double *q, const double *v, const double *wrench,
+                     double *joint_acceleration, lw_fault *fault);
+lw_spatial lw_total_wrench(const lw_link *link, const double *wrench);
+double lw_wrench_power(const lw_multibody *multibody, const double *wrench);
+/* lw_inputs.c */
+int lw_inputs_check(const lw_multibody *multibody, const double *state, int32_t count,
+                    const double *wrenches, const double *added_inertia, lw_fault *fault);
+
+#endif

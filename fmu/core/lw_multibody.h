@@ -1,0 +1,128 @@
+/* Rigid bodies in a tree of joints: flat tables in, motion out. The equations are in fmu/README.md.
+ *
+ * World-aligned axes, SI units, radians, quaternions (w, x, y, z). Body i is carried by joint i. Nothing
+ * is allocated here and there are no globals: the caller gives one block of memory per mechanism, and
+ * one mechanism may be used by one thread at a time.
+ */
+#ifndef LW_MULTIBODY_H
+#define LW_MULTIBODY_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "lw_math.h"
+
+typedef enum { LW_FIXED, LW_REVOLUTE, LW_PRISMATIC, LW_PLANAR, LW_SPHERICAL, LW_FREE } lw_joint_type;
+enum { LW_JOINT_TYPES = 6 };
+
+typedef enum { LW_EULER, LW_SEMI_IMPLICIT_EULER, LW_RK4, LW_DOPRI5 } lw_integrator;
+
+/* A mechanism. Joint i carries body i; q_index and v_index are explicit, so that a joint may own more
+ * coordinates than its type needs. Coordinates that no joint uses keep their value. */
+typedef struct {
+    int32_t n, nq, nv;
+    const int32_t *parent;         /* (n) index of the parent body, -1 = world */
+    const int32_t *order;          /* (n) the bodies, every parent before its children */
+    const int32_t *joint_type;     /* (n) lw_joint_type */
+    const int32_t *q_index;        /* (n) first coordinate of the joint in q */
+    const int32_t *v_index;        /* (n) first coordinate of the joint in v */
+    const double *parent_point;    /* (n,3) joint frame origin, parent's body frame, from its COM [m] */
+    const double *parent_rotation; /* (n,3,3) joint frame to parent body frame */
+    const double *child_point;     /* (n,3) joint frame origin, child's body frame, from its COM [m] */
+    const double *child_rotation;  /* (n,3,3) joint frame to child body frame */
+    const double *mass;            /* (n) [kg] */
+    const double *inertia;         /* (n,6) Ixx Iyy Izz Ixy Ixz Iyz, body frame, about the COM [kg m2] */
+    const double *gravity;         /* (3) [m/s2] */
+    const double *stiffness;       /* (nv) [N/m, N m/rad] */
+    const double *damping;         /* (nv) [N s/m, N m s/rad] */
+    const double *rest;            /* (nq) configuration without spring force */
+} lw_tables;
+
+/* 0 is success; `lw_fault` names the item and the time. */
+typedef enum {
+    LW_OK = 0,
+    /* numerical trouble */
+    LW_SINGULAR,             /* item: body whose joint has no inertia to move */
+    LW_NOT_FINITE,           /* item: body whose coordinates overflowed */
+    LW_STEP_UNDERFLOW,       /* the error control asks for steps of nothing */
+    LW_WRENCH_NOT_FINITE,    /* item: body */
+    LW_ADDED_NOT_FINITE,     /* item: body */
+    LW_STATE_NOT_FINITE,     /* item: index in the state */
+    /* arguments */
+    LW_BAD_STEP = 20,
+    LW_BAD_NODES,
+    LW_BAD_INTEGRATOR,
+    LW_BAD_SUBSTEPS,
+    LW_BAD_TOLERANCE,
+    /* tables, named like the field; item: its row */
+    LW_BAD_COUNT = 40,
+    LW_BAD_PARENT,
+    LW_BAD_ORDER,
+    LW_BAD_JOINT_TYPE,
+    LW_BAD_Q_INDEX,
+    LW_BAD_V_INDEX,
+    LW_BAD_PARENT_POINT,
+    LW_BAD_PARENT_ROTATION,
+    LW_BAD_CHILD_POINT,
+    LW_BAD_CHILD_ROTATION,
+    LW_BAD_MASS,
+    LW_BAD_INERTIA,
+    LW_BAD_GRAVITY,
+    LW_BAD_STIFFNESS,
+    LW_BAD_DAMPING,
+    LW_BAD_REST
+} lw_status;
+
+typedef struct {
+    int32_t item;
+    double time; /* within the macro step [s] */
+} lw_fault;
+
+typedef struct lw_multibody lw_multibody;
+
+/* Number of coordinates of a joint type in q and in v; -1 for an unknown type. */
+LW_API int lw_joint_nq(int joint_type);
+LW_API int lw_joint_nv(int joint_type);
+
+/* Bytes that a mechanism of this size needs; 8-byte alignment. */
+LW_API size_t lw_multibody_size(int32_t n, int32_t nq, int32_t nv);
+
+/* Check the tables and build the mechanism in `memory`; the tables may go afterwards. */
+LW_API int lw_multibody_init(lw_multibody *memory, const lw_tables *tables, lw_fault *fault);
+
+/* A state is nq + nv + 1 numbers: q, v, and the substep [s] that dopri5 would take next (0 = not known). */
+
+/* One macro step of h [s] from `state` to `next` (which may be the same memory).
+ *
+ * The wrench is the polynomial through `wrenches` (count, n, 6: force, torque in W at the COM) at `nodes`
+ * in units of h from the start of the step. `added_inertia` (n, 6, 6: body frame at the COM, symmetric
+ * positive semi-definite, force first) or NULL; the force -A a is added to the wrench. `work` receives the
+ * work [J] of the whole wrench on the bodies and the energy that the joint dampers took. */
+LW_API int lw_multibody_advance(lw_multibody *multibody, const double *state, double h, int32_t count,
+                                const double *nodes, const double *wrenches, const double *added_inertia,
+                                int32_t integrator, int32_t substeps, double rtol, double atol,
+                                double *next, double *work, lw_fault *fault);
+
+/* Poses and twists of the bodies: position (n,3), orientation (n,4), linear (n,3), angular (n,3), in W. */
+LW_API void lw_multibody_motion(lw_multibody *multibody, const double *state, double *position,
+                                double *orientation, double *linear, double *angular);
+
+/* Accelerations and reactions under `wrench` (n,6): joint_acceleration (nv), acceleration (n,6) linear
+ * first, reaction (n,6) of parent on child at the joint's point on the child, total_wrench (n,6). */
+LW_API int lw_multibody_evaluate(lw_multibody *multibody, const double *state, const double *wrench,
+                                 const double *added_inertia, double *joint_acceleration,
+                                 double *acceleration, double *reaction, double *total_wrench,
+                                 lw_fault *fault);
+
+/* Kinetic and potential energy [J]; gravity counts from the origin of W, springs from their rest. */
+LW_API void lw_multibody_energy(lw_multibody *multibody, const double *state, double *kinetic,
+                                double *potential);
+
+/* Largest distance [m] by which given poses violate a joint. */
+LW_API double lw_multibody_joint_gap(const lw_multibody *multibody, const double *position,
+                                     const double *orientation);
+
+/* Evaluate the accelerations `repeats` times under zero wrench, for benchmarks. */
+LW_API int lw_multibody_repeat(lw_multibody *multibody, const double *state, int32_t repeats);
+
+#endif

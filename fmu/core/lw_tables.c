@@ -1,0 +1,110 @@
+/* Are the tables a mechanism? Each check answers with the field (as status) and the row (as fault). */
+#include "lw_model.h"
+
+static const int joint_nq[LW_JOINT_TYPES] = {0, 1, 1, 3, 4, 7};
+static const int joint_nv[LW_JOINT_TYPES] = {0, 1, 1, 3, 3, 6};
+
+int lw_joint_nq(int type) { return type >= 0 && type < LW_JOINT_TYPES ? joint_nq[type] : -1; }
+int lw_joint_nv(int type) { return type >= 0 && type < LW_JOINT_TYPES ? joint_nv[type] : -1; }
+
+static int all_finite(const double *values, int count) {
+    for (int i = 0; i < count; ++i)
+        if (!isfinite(values[i])) return 0;
+    return 1;
+}
+
+static int is_rotation(const double *r) {
+    lw_mat3 m = lw_load9(r);
+    lw_vec3 x = lw_load3(r), y = lw_load3(r + 3), z = lw_load3(r + 6);
+    double tolerance = 1e-9, determinant = lw_dot(lw_cross(x, y), z);
+    return all_finite(r, 9) && fabs(m.xx * m.yx + m.xy * m.yy + m.xz * m.yz) < tolerance &&
+           fabs(lw_dot(x, z)) < tolerance && fabs(lw_dot(y, z)) < tolerance &&
+           fabs(lw_dot(x, x) - 1.0) < tolerance && fabs(lw_dot(y, y) - 1.0) < tolerance &&
+           fabs(lw_dot(z, z) - 1.0) < tolerance && determinant > 0.0;
+}
+
+/* Position of body b in the order, -1 if it is not there. */
+static int place(const lw_tables *t, int b) {
+    for (int k = 0; k < t->n; ++k)
+        if (t->order[k] == b) return k;
+    return -1;
+}
+
+static int check_tree(const lw_tables *t, int i) {
+    if (t->parent[i] < -1 || t->parent[i] >= t->n) return LW_BAD_PARENT;
+    int own = place(t, i);
+    if (own < 0) return LW_BAD_ORDER;
+    if (t->parent[i] >= 0 && place(t, t->parent[i]) >= own) return LW_BAD_ORDER;
+    return LW_OK;
+}
+
+static int overlap(int a, int size_a, int b, int size_b) { return a < b + size_b && b < a + size_a; }
+
+static int check_coordinates(const lw_tables *t, int i) {
+    int nq = lw_joint_nq(t->joint_type[i]), nv = lw_joint_nv(t->joint_type[i]);
+    if (nq < 0) return LW_BAD_JOINT_TYPE;
+    if (t->q_index[i] < 0 || t->q_index[i] > t->nq - nq) return LW_BAD_Q_INDEX;
+    if (t->v_index[i] < 0 || t->v_index[i] > t->nv - nv) return LW_BAD_V_INDEX;
+    for (int k = 0; k < i; ++k) {
+        int other_nq = lw_joint_nq(t->joint_type[k]), other_nv = lw_joint_nv(t->joint_type[k]);
+        if (nq && other_nq && overlap(t->q_index[i], nq, t->q_index[k], other_nq)) return LW_BAD_Q_INDEX;
+        if (nv && other_nv && overlap(t->v_index[i], nv, t->v_index[k], other_nv)) return LW_BAD_V_INDEX;
+    }
+    return LW_OK;
+}
+
+static int check_frames(const lw_tables *t, int i) {
+    if (!all_finite(t->parent_point + 3 * i, 3)) return LW_BAD_PARENT_POINT;
+    if (!is_rotation(t->parent_rotation + 9 * i)) return LW_BAD_PARENT_ROTATION;
+    if (!all_finite(t->child_point + 3 * i, 3)) return LW_BAD_CHILD_POINT;
+    if (!is_rotation(t->child_rotation + 9 * i)) return LW_BAD_CHILD_ROTATION;
+    return LW_OK;
+}
+
+/* Zero is allowed for both: a massless body may move by its added inertia. */
+static int check_mass(const lw_tables *t, int i) {
+    const double *inertia = t->inertia + 6 * i;
+    if (!isfinite(t->mass[i]) || t->mass[i] < 0.0) return LW_BAD_MASS;
+    if (!all_finite(inertia, 6) || inertia[0] < 0.0 || inertia[1] < 0.0 || inertia[2] < 0.0)
+        return LW_BAD_INERTIA;
+    return LW_OK;
+}
+
+/* The rest of a rotation is a quaternion that must have a direction. */
+static int check_rest(const lw_tables *t, int i) {
+    int type = t->joint_type[i], nq = lw_joint_nq(type);
+    const double *rest = t->rest + t->q_index[i];
+    if (!all_finite(rest, nq)) return LW_BAD_REST;
+    if (type != LW_SPHERICAL && type != LW_FREE) return LW_OK;
+    const double *quat = rest + nq - 4;
+    return quat[0] * quat[0] + quat[1] * quat[1] + quat[2] * quat[2] + quat[3] * quat[3] > 0.0
+               ? LW_OK : LW_BAD_REST;
+}
+
+static int check_row(const lw_tables *t, int i) {
+    int (*const checks[])(const lw_tables *, int) = {check_tree, check_coordinates, check_frames, check_mass,
+                                                     check_rest};
+    for (size_t k = 0; k < sizeof checks / sizeof checks[0]; ++k) {
+        int status = checks[k](t, i);
+        if (status) return status;
+    }
+    return LW_OK;
+}
+
+int lw_tables_check(const lw_tables *t, lw_fault *fault) {
+    fault->item = 0;
+    fault->time = 0.0;
+    if (t->n < 1 || t->nq < 0 || t->nv < 0) return LW_BAD_COUNT;
+    if (!all_finite(t->gravity, 3)) return LW_BAD_GRAVITY;
+    for (int i = 0; i < t->n; ++i) {
+        int status = check_row(t, i);
+        fault->item = i;
+        if (status) return status;
+    }
+    for (int k = 0; k < t->nv; ++k) {
+        fault->item = k;
+        if (!isfinite(t->stiffness[k])) return LW_BAD_STIFFNESS;
+        if (!isfinite(t->damping[k])) return LW_BAD_DAMPING;
+    }
+    return LW_OK;
+}

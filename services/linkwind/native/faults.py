@@ -1,0 +1,49 @@
+"""What the core reports, as exceptions."""
+
+from __future__ import annotations
+
+import ctypes  # noqa: TID251 - native/ is the one place
+from typing import Any, NoReturn
+
+from linkwind.errors import SimulationError
+
+
+class Fault(ctypes.Structure):
+    """``lw_fault``: the item, and the time [s] within the macro step."""
+
+    _fields_ = [("item", ctypes.c_int32), ("time", ctypes.c_double)]
+
+
+_REPAIR = "Check forces, stiffnesses and the step size"
+_NUMERICS = {
+    1: ("joint {item}", "inertia to move its body {item}", "a singular inertia",
+        "Give the body mass, inertia or added inertia"),
+    2: ("body {item}", "finite coordinates", "an overflow", _REPAIR),
+    3: ("dopri5", "a substep that meets the tolerance", "a substep that shrank to nothing", _REPAIR),
+    4: ("wrench on body {item}", "finite numbers", "NaN or infinity", "Check the force provider"),
+    5: ("added inertia of body {item}", "finite numbers", "NaN or infinity", "Check the force provider"),
+    6: ("state[{item}]", "a finite number", "NaN or infinity", _REPAIR),
+}  # fmt: skip
+_ARGUMENTS = {
+    20: ("h", "a positive macro step [s]"),
+    21: ("nodes", "1 to 8 distinct finite nodes"),
+    22: ("integrator", "a code of Integrator"),
+    23: ("substeps", "at least 1"),
+    24: ("rtol, atol", "rtol of zero or more and a positive atol"),
+}
+
+
+def fail(status: int, fault: Fault, arguments: dict[str, Any]) -> NoReturn:
+    """Raise what the core reported.
+
+    Raises:
+        ValueError: one of the ``arguments`` of the call makes no sense.
+        SimulationError: numerical trouble.
+    """
+    if status in _ARGUMENTS:
+        name, expected = _ARGUMENTS[status]
+        raise ValueError(f"{name}: expected {expected}; got {arguments[name]}. Correct the call.")
+    subject, expected, found, repair = (text.format(item=fault.item) for text in _NUMERICS[status])
+    raise SimulationError(
+        f"{subject}: expected {expected}; got {found}, {fault.time:.9g} s into the step. {repair}."
+    )

@@ -1,0 +1,251 @@
+"""The multibody core: flat tables of a mechanism in, motion out.
+
+The equations, the joint coordinates and the integrators are in ``fmu/README.md``. Everything is SI, in
+world axes at the centres of mass, and body i is carried by joint i.
+"""
+
+from __future__ import annotations
+
+import ctypes  # noqa: TID251 - native/ is the one place
+import enum
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from linkwind.native.faults import Fault, fail
+from linkwind.native.library import declare
+from linkwind.native.tables import (
+    JOINT_TYPES,
+    NQ,
+    NV,
+    QUATERNION_AT,
+    CTables,
+    Tables,
+    contiguous,
+    refuse,
+)
+from linkwind.spatial import Array, Motion, address
+
+__all__ = ["JOINT_TYPES", "NQ", "NV", "Evaluation", "Integrator", "Multibody", "Tables"]
+
+
+class Integrator(enum.IntEnum):
+    """How a macro step is taken; all but DOPRI5 take equal substeps."""
+
+    EULER = 0
+    SEMI_IMPLICIT_EULER = 1
+    RK4 = 2
+    DOPRI5 = 3
+
+
+class Evaluation(NamedTuple):
+    """Accelerations and forces at one instant.
+
+    Attributes:
+        joint_acceleration: dv/dt [rad/s², m/s²], shape (nv,).
+        acceleration: of the bodies in W at the centres of mass, linear first [m/s², rad/s²], shape (n, 6).
+        reaction: of the parent on the child through the joint, springs and dampers included, force first
+            [N, N·m], shape (n, 6), in W at the joint's point on the child.
+        total_wrench: wrench - A a [N, N·m], shape (n, 6), force first, in W at the centres of mass.
+    """
+
+    joint_acceleration: Array
+    acceleration: Array
+    reaction: Array
+    total_wrench: Array
+
+
+_pointer, _int, _double = ctypes.c_void_p, ctypes.c_int32, ctypes.c_double
+_size = declare("lw_multibody_size", [_int] * 3, ctypes.c_size_t)
+_init = declare("lw_multibody_init", [_pointer] * 3)
+_advance = declare(
+    "lw_multibody_advance",
+    [_pointer, _pointer, _double, _int, *[_pointer] * 3, _int, _int, _double, _double, *[_pointer] * 3],
+)
+_motion = declare("lw_multibody_motion", [_pointer] * 6, None)
+_evaluate = declare("lw_multibody_evaluate", [_pointer] * 9)
+_energy = declare("lw_multibody_energy", [_pointer] * 4, None)
+_joint_gap = declare("lw_multibody_joint_gap", [_pointer] * 3, _double)
+_repeat = declare("lw_multibody_repeat", [_pointer, _pointer, _int])
+
+
+class Multibody:
+    """A mechanism, ready to move.
+
+    One object serves one thread at a time. All methods are pure functions of their arguments: the same
+    input gives the same bits.
+
+    Attributes:
+        n: number of bodies.
+        nq: number of coordinates.
+        nv: number of degrees of freedom.
+        state_size: length of a state: q, v, and the substep [s] that dopri5 would take next (0 = unknown).
+    """
+
+    def __init__(self, tables: Tables) -> None:
+        """Build the mechanism.
+
+        Raises:
+            MechanismError: a table has a wrong shape or a wrong value.
+        """
+        arrays = contiguous(tables)
+        self.tables = tables
+        self.n, self.nq, self.nv = len(tables.parent), len(tables.rest), len(tables.stiffness)
+        self.state_size = self.nq + self.nv + 1
+        self._memory = np.zeros((_size(self.n, self.nq, self.nv) + 7) // 8)
+        self._state, self._next = np.zeros(self.state_size), np.zeros(self.state_size)
+        self._work, self._energies, self._fault = np.zeros(2), np.zeros(2), Fault()
+        buffers = (self._memory, self._state, self._next, self._work, self._energies)
+        self._model, self._state_at, self._next_at, self._work_at, self._energies_at = map(address, buffers)
+        self._fault_at = ctypes.addressof(self._fault)
+        self._seen: list[tuple[Any, int]] = [(None, 0)] * 3
+        pointers = {name: array.ctypes.data for name, array in arrays.items()}
+        native = CTables(n=self.n, nq=self.nq, nv=self.nv, **pointers)
+        if status := _init(self._model, ctypes.addressof(native), self._fault_at):
+            refuse(tables, status, self._fault.item)
+
+    def initial_state(self, q: Array, v: Array) -> Array:
+        """Return the state with coordinates ``q``, shape (nq,), and velocities ``v``, shape (nv,).
+
+        Quaternions in q are normalised.
+
+        Raises:
+            ValueError: a wrong shape, a number that is not finite, or a quaternion of zero length.
+        """
+        for name, value, size in (("q", q, self.nq), ("v", v, self.nv)):
+            if np.shape(value) != (size,):
+                raise ValueError(f"{name}: expected shape ({size},); got {np.shape(value)}. See nq and nv.")
+            if not np.isfinite(value).all():
+                raise ValueError(f"{name}: expected finite numbers; got {value}. Correct the initial state.")
+        state = np.concatenate([q, v, [0.0]]).astype(np.float64)
+        for code, start in zip(self.tables.joint_type, self.tables.q_index, strict=True):
+            if code not in QUATERNION_AT:
+                continue
+            first = int(start) + QUATERNION_AT[code]
+            quaternion = state[first : first + 4]
+            if not quaternion.any():
+                raise ValueError(f"q[{first}:{first + 4}]: expected a quaternion; got zeros. Use 1, 0, 0, 0.")
+            quaternion /= np.linalg.norm(quaternion)
+        return state
+
+    def advance(
+        self,
+        state: Array,
+        h: float,
+        nodes: Array,
+        wrenches: Array,
+        added_inertia: Array | None,
+        *,
+        integrator: Integrator | int,
+        substeps: int = 1,
+        rtol: float = 1e-6,
+        atol: float = 1e-9,
+    ) -> tuple[Array, Array]:
+        """Take one macro step.
+
+        The wrench is the Lagrange polynomial through ``wrenches`` at ``nodes``; one node holds it.
+
+        Args:
+            state: shape (state_size,).
+            h: macro step [s].
+            nodes: shape (m,), m ≤ 8, in units of h from the start of the step: 0 is its start, 1 its end.
+            wrenches: [N, N·m], shape (m, n, 6), force first, in W at the centres of mass, C-contiguous.
+            added_inertia: A, shape (n, 6, 6), in the body frames, symmetric positive semi-definite,
+                C-contiguous; the force -A a is added to the wrench. Or None.
+            integrator: one of ``Integrator``.
+            substeps: number of equal substeps; of dopri5, h/substeps bounds the first substep.
+            rtol: tolerance of dopri5, relative to each coordinate and velocity, per substep.
+            atol: its absolute part, in the unit of the coordinate.
+
+        Returns:
+            The new state, and the work [J], shape (2,): done over the step by the whole wrench, and taken
+            by the joint dampers, integrated with the same scheme.
+
+        Raises:
+            SimulationError: singular inertia, NaN or infinity, or an underflow of the substep.
+            ValueError: an argument that makes no sense, or of a wrong shape.
+        """
+        count = len(nodes)
+        self._take(state)
+        if wrenches.shape != (count, self.n, 6):
+            self._refuse("wrenches", (count, self.n, 6), wrenches)
+        status = _advance(
+            self._model, self._state_at, h, count, self._locate(0, nodes), self._locate(1, wrenches),
+            self._locate_added(added_inertia), integrator, substeps, rtol, atol,
+            self._next_at, self._work_at, self._fault_at,
+        )  # fmt: skip
+        if status:
+            arguments = {"h": h, "nodes": nodes, "integrator": integrator, "substeps": substeps}
+            fail(status, self._fault, arguments | {"rtol, atol": (rtol, atol)})
+        return self._next.copy(), self._work.copy()
+
+    def motion(self, state: Array, out: Motion) -> None:
+        """Write poses and twists of the bodies at ``state``, shape (state_size,), into ``out``."""
+        self._take(state)
+        if len(out) != self.n:
+            raise ValueError(f"out: expected a Motion of {self.n} bodies; got {len(out)}. One per body.")
+        _motion(self._model, self._state_at, *out.addresses)
+
+    def evaluate(self, state: Array, wrench: Array, added_inertia: Array | None = None) -> Evaluation:
+        """Return accelerations, reactions and the whole wrench under a wrench, shape (n, 6), in W.
+
+        Raises:
+            SimulationError: singular inertia, NaN or infinity.
+            ValueError: an argument of a wrong shape.
+        """
+        self._take(state)
+        if wrench.shape != (self.n, 6):
+            self._refuse("wrench", (self.n, 6), wrench)
+        bodies = (self.n, 6)
+        result = Evaluation(np.zeros(self.nv), np.zeros(bodies), np.zeros(bodies), np.zeros(bodies))
+        status = _evaluate(
+            self._model, self._state_at, self._locate(1, wrench), self._locate_added(added_inertia),
+            *map(address, result), self._fault_at,
+        )  # fmt: skip
+        if status:
+            fail(status, self._fault, {})
+        return result
+
+    def energy(self, state: Array) -> tuple[float, float]:
+        """Return kinetic and potential energy [J]: gravity from the origin of W, springs from rest."""
+        self._take(state)
+        _energy(self._model, self._state_at, self._energies_at, self._energies_at + 8)
+        return float(self._energies[0]), float(self._energies[1])
+
+    def joint_gap(self, motion: Motion) -> float:
+        """Return the largest distance [m] by which given poses violate a joint.
+
+        Fixed, revolute and spherical joints: the distance of the joint's two points; prismatic: off the
+        axis; planar: off the plane; free: 0.
+        """
+        return float(_joint_gap(self._model, *motion.addresses[:2]))
+
+    def repeat(self, state: Array, repeats: int) -> None:
+        """Evaluate the accelerations ``repeats`` times without wrench: the work that benchmarks time."""
+        self._take(state)
+        if status := _repeat(self._model, self._state_at, repeats):
+            fail(status, self._fault, {})
+
+    def _take(self, state: Array) -> None:
+        if state.shape != self._state.shape:
+            self._refuse("state", self._state.shape, state)
+        self._state[:] = state
+
+    def _locate(self, slot: int, array: Array) -> int:
+        """Return an array's address; looked up once for an array that comes again and again."""
+        seen, at = self._seen[slot]
+        if seen is not array:
+            at = address(array)
+            self._seen[slot] = (array, at)
+        return at
+
+    def _locate_added(self, added_inertia: Array | None) -> int | None:
+        if added_inertia is None:
+            return None
+        if added_inertia.shape != (self.n, 6, 6):
+            self._refuse("added_inertia", (self.n, 6, 6), added_inertia)
+        return self._locate(2, added_inertia)
+
+    @staticmethod
+    def _refuse(name: str, shape: tuple[int, ...], array: Array) -> None:
+        raise ValueError(f"{name}: expected shape {shape}; got {array.shape}. One entry per node and body.")

@@ -1,0 +1,131 @@
+"""The tables of a mechanism, and what the core has to say against them."""
+
+from __future__ import annotations
+
+import ctypes  # noqa: TID251 - native/ is the one place
+from dataclasses import dataclass, fields
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwind.errors import MechanismError
+from linkwind.spatial import Array
+
+Index = NDArray[np.int32]
+
+JOINT_TYPES: dict[str, int] = {
+    "fixed": 0,
+    "revolute": 1,
+    "prismatic": 2,
+    "planar": 3,
+    "spherical": 4,
+    "free": 5,
+}
+NQ: dict[str, int] = dict(zip(JOINT_TYPES, (0, 1, 1, 3, 4, 7), strict=True))
+NV: dict[str, int] = dict(zip(JOINT_TYPES, (0, 1, 1, 3, 3, 6), strict=True))
+QUATERNION_AT = {JOINT_TYPES["spherical"]: 0, JOINT_TYPES["free"]: 3}
+
+
+@dataclass(frozen=True)
+class Tables:
+    """A mechanism of n bodies in scenario order; joint i carries body i.
+
+    Attributes:
+        parent: index of the parent body, -1 for the world, int32, shape (n,).
+        order: the bodies with every parent before its children, int32, shape (n,).
+        joint_type: codes of ``JOINT_TYPES``, int32, shape (n,).
+        q_index, v_index: first coordinate of each joint in q and v, int32, shape (n,).
+        parent_point: joint frame origin from the parent's centre of mass, in its body frame [m], shape
+            (n, 3); of a root in W.
+        parent_rotation: joint frame to parent body frame, shape (n, 3, 3).
+        child_point: joint frame origin from the child's centre of mass, in its body frame [m], shape (n, 3).
+        child_rotation: joint frame to child body frame, shape (n, 3, 3).
+        mass: [kg], shape (n,).
+        inertia: Ixx, Iyy, Izz, Ixy, Ixz, Iyz as matrix elements, body frame, about the centre of mass
+            [kg·m²], shape (n, 6).
+        gravity: [m/s²], shape (3,), in W.
+        stiffness, damping: of each degree of freedom [N/m or N·m/rad; times s], shape (nv,).
+        rest: coordinates without spring force, shape (nq,); quaternions where q has them.
+    """
+
+    parent: Index
+    order: Index
+    joint_type: Index
+    q_index: Index
+    v_index: Index
+    parent_point: Array
+    parent_rotation: Array
+    child_point: Array
+    child_rotation: Array
+    mass: Array
+    inertia: Array
+    gravity: Array
+    stiffness: Array
+    damping: Array
+    rest: Array
+
+
+class CTables(ctypes.Structure):
+    """``lw_tables`` of the library."""
+
+    _fields_ = [(name, ctypes.c_int32) for name in ("n", "nq", "nv")] + [
+        (field.name, ctypes.c_void_p) for field in fields(Tables)
+    ]
+
+
+_CHECKS = {
+    40: ("parent", "at least one body"),
+    41: ("parent", "the index of another body, or -1 for the world"),
+    42: ("order", "every body once, its parent before it"),
+    43: ("joint_type", "one of " + ", ".join(f"{code} ({name})" for name, code in JOINT_TYPES.items())),
+    44: ("q_index", "room in q for the joint's coordinates, shared with no other joint"),
+    45: ("v_index", "room in v for the joint's coordinates, shared with no other joint"),
+    46: ("parent_point", "finite numbers"),
+    47: ("parent_rotation", "a rotation matrix"),
+    48: ("child_point", "finite numbers"),
+    49: ("child_rotation", "a rotation matrix"),
+    50: ("mass", "zero or more"),
+    51: ("inertia", "finite numbers and a diagonal of zero or more"),
+    52: ("gravity", "finite numbers"),
+    53: ("stiffness", "finite numbers"),
+    54: ("damping", "finite numbers"),
+    55: ("rest", "finite coordinates, quaternions not zero"),
+}
+
+
+def _shapes(n: int, nq: int, nv: int) -> dict[str, tuple[int, ...]]:
+    integers = dict.fromkeys(("parent", "order", "joint_type", "q_index", "v_index"), (n,))
+    points = dict.fromkeys(("parent_point", "child_point"), (n, 3))
+    rotations = dict.fromkeys(("parent_rotation", "child_rotation"), (n, 3, 3))
+    degrees = dict.fromkeys(("stiffness", "damping"), (nv,))
+    return (
+        {"mass": (n,), "inertia": (n, 6), "gravity": (3,), "rest": (nq,)}
+        | integers | points | rotations | degrees
+    )  # fmt: skip
+
+
+def contiguous(tables: Tables) -> dict[str, NDArray[Any]]:
+    """Return the tables as contiguous arrays of the right type, or raise MechanismError for a shape."""
+    n, nq, nv = np.size(tables.parent), np.size(tables.rest), np.size(tables.stiffness)
+    arrays = {}
+    for name, shape in _shapes(n, nq, nv).items():
+        wanted = np.int32 if name in ("parent", "order", "joint_type") or "index" in name else np.float64
+        arrays[name] = np.ascontiguousarray(getattr(tables, name), dtype=wanted)
+        if np.shape(getattr(tables, name)) != shape:
+            raise MechanismError(
+                f"tables.{name}: expected shape {shape} for {n} bodies, {nq} coordinates and {nv} degrees of "
+                f"freedom; got {np.shape(getattr(tables, name))}. Make all tables of one mechanism."
+            )
+    return arrays
+
+
+def refuse(tables: Tables, status: int, item: int) -> NoReturn:
+    """Raise MechanismError for the row ``item`` of the table that the core named by ``status``."""
+    field, expected = _CHECKS[status]
+    rows = np.atleast_1d(getattr(tables, field))
+    whole = field in ("gravity", "order") or item >= len(rows)
+    place, got = (field, rows) if whole else (f"{field}[{item}]", rows[item])
+    raise MechanismError(
+        f"tables.{place}: expected {expected}; got {np.array(got).tolist()}. Correct the mechanism."
+    )
