@@ -2,23 +2,108 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
-from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
 from linkwind.coupling import CommunicationPoint
-from linkwind.dynamics.plant import State
-from linkwind.log import LogWriter, StateMessage, StepMessage, TimingMessage
+from linkwind.log.state import StateEncoder, StepEncoder, TimingEncoder
+from linkwind.log.writer import LogWriter
 from linkwind.mechanism import Mechanism
 from linkwind.native.multibody import Multibody
 from linkwind.scenario import Scenario
+from linkwind.spatial import Motion, Wrench
 
 
 class Recorder:
-    """Writes the log of one run and keeps what the summary needs.
+    """Computes what belongs to each communication point, writes the log, keeps what the summary needs.
 
     Attributes:
         joint_gap_max: largest distance of two joint points so far, from the poses [m].
         force_max: largest aerodynamic force on a body so far [N].
     """
+
+    def __init__(self, log: LogWriter, scenario: Scenario, mechanism: Mechanism, multibody: Multibody) -> None:
+        n = multibody.n
+        self.joint_gap_max = 0.0
+        self.force_max = 0.0
+        self.motion = log.motion
+        self.wrench = log.wrench
+        self._log = log
+        self._multibody = multibody
+        self._step_ns = scenario.coupling.step_ns
+        self._state = StateEncoder(n, multibody.nq, multibody.nv)
+        self._step = StepEncoder(scenario.coupling.order)
+        self._timing = TimingEncoder()
+        self._accepted, self._trial = Motion.at_rest(n), Motion.at_rest(n)
+        self._total = Wrench.zeros(n)
+        # Twist norm: mass for the linear part, the mean principal inertia for the angular one.
+        tables = mechanism.tables
+        self._mass = tables.mass[:, None]
+        self._inertia = tables.inertia[:, :3].mean(axis=1)[:, None]
+
+    def point(self, point: CommunicationPoint) -> None:
+        """Write an accepted communication point and what the coupling did to get there."""
+        multibody, values = self._multibody, point.state.values
+        time_ns = point.step * self._step_ns
+        multibody.motion(values, self._accepted)
+        result = multibody.evaluate(values, point.wrench, point.added_inertia)
+        kinetic, potential = multibody.energy(values)
+        gap = multibody.joint_gap(self._accepted)
+        nq, nv = multibody.nq, multibody.nv
+        payload = self._state.encode(
+            point.step,
+            time_ns,
+            self._accepted,
+            q=values[:nq],
+            v=values[nq : nq + nv],
+            acceleration=result.acceleration,
+            reaction=result.reaction,
+            wrench=result.total_wrench,
+            kinetic_energy=kinetic,
+            potential_energy=potential,
+            external_work=point.state.external_work,
+            dissipated_work=point.state.dissipated_work,
+            joint_gap=gap,
+        )
+        self._log.state(payload, time_ns)
+        self._coupling(point, time_ns)
+        force = self._total.force
+        force[:] = result.total_wrench[:, :3]
+        self._total.torque[:] = result.total_wrench[:, 3:]
+        self._log.scene(time_ns, self._accepted, self._total)
+        self.joint_gap_max = max(self.joint_gap_max, gap)
+        self.force_max = max(self.force_max, math.sqrt((force * force).sum(axis=1).max()))
+
+    def _coupling(self, point: CommunicationPoint, time_ns: int) -> None:
+        """Write how far the trial state was from the accepted one, and the power lost between them."""
+        accepted, trial = self._accepted, self._trial
+        self._multibody.motion(point.trial.values, trial)
+        linear = accepted.linear - trial.linear
+        angular = accepted.angular - trial.angular
+        squared = (self._mass * linear * linear).sum() + (self._inertia * angular * angular).sum()
+        power = (point.wrench[:, :3] * linear).sum() + (point.wrench[:, 3:] * angular).sum()
+        payload = self._step.encode(
+            point.step,
+            time_ns,
+            iteration=point.iterations - 1,
+            order=point.order,
+            extrapolation_error=point.errors,
+            residual=math.sqrt(squared),
+            interface_energy=float(power) * self._step_ns / 1e9,
+        )
+        self._log.step(payload, time_ns)
+
+    def timing(self, step: int, time_ns: int, exchange_ns: int) -> None:
+        """Write how long an exchange took on the wall clock."""
+        self._log.timing(self._timing.encode(step, exchange_ns), time_ns)
+
+
+def tables_sha256(mechanism: Mechanism) -> str:
+    """Return the hash of everything that the core is given about the mechanism."""
+    digest = hashlib.sha256()
+    for array in (*vars(mechanism.tables).values(), mechanism.q0, mechanism.v0):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()

@@ -64,8 +64,9 @@ class DynamicsService:
             providers={p.name: p.bodies for p in scenario.providers},
         )
         self._scenario = scenario
-        self._mechanism = mechanism
+        self.mechanism = mechanism
         self._plant = MechanismPlant(mechanism, scenario)
+        self.multibody = self._plant.multibody
         n = len(mechanism.bodies)
         self._wrench = np.zeros((n, 6))
         self._added_inertia = np.zeros((n, 6, 6))
@@ -107,7 +108,7 @@ class DynamicsService:
             exchanges=self._exchanges,
             wall_s=wall,
             exchange_us=self._exchange_ns[: self._exchanges] / 1e3,
-            joint_gap_max_m=recorder.joint_gap_max if self._mechanism.has_joints else None,
+            joint_gap_max_m=recorder.joint_gap_max if self.mechanism.has_joints else None,
             force_max_N=recorder.force_max,
             final_state_sha256=self._digest(final),
         )
@@ -120,11 +121,10 @@ class DynamicsService:
                 f"{missing} did not come within {timeout:g} s (bus.start_timeout). Start it with: "
                 f"linkwind aero --connect ENDPOINT --name {self.session.not_ready[0]}"
             )
-        self._recorder.start(self.session.providers)
 
     def _march(self, progress: Callable[[int], None]) -> State:
         """Let the coupling scheme do every step; return the last state."""
-        scenario, mechanism = self._scenario, self._mechanism
+        scenario, mechanism = self._scenario, self.mechanism
         settings = Settings(
             weight=acceleration_weight(mechanism),
             order=scenario.coupling.order,
@@ -136,7 +136,7 @@ class DynamicsService:
         state = self._plant.initial
         for point in scheme(self._plant, self._exchange, state, scenario.steps, settings):
             # The scheme reuses its arrays; the log is written while the next answer is awaited.
-            self._pending.append(point._replace(wrench=point.wrench.copy()))
+            self._pending.append(_own(point))
             state = point.state
             if point.step % stride == 0:
                 progress(point.step)
@@ -184,10 +184,16 @@ class DynamicsService:
             raise LostError(f"{missing} did not say Bye within {GOODBYE_TIMEOUT:g} s of the last step")
 
     def _digest(self, final: State) -> str:
-        motion = Motion.at_rest(len(self._mechanism.bodies))
+        motion = Motion.at_rest(len(self.mechanism.bodies))
         self._plant.multibody.motion(final.values, motion)
         parts = [motion.position, motion.orientation, motion.linear, motion.angular]
         return hashlib.sha256(np.hstack(parts).astype("<f8").tobytes()).hexdigest()
+
+
+def _own(point: CommunicationPoint) -> CommunicationPoint:
+    """Return ``point`` with copies of what the scheme will write over."""
+    added = point.added_inertia
+    return point._replace(wrench=point.wrench.copy(), added_inertia=None if added is None else added.copy())
 
 
 def acceleration_weight(mechanism: Mechanism) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from linkwind.bus.base import DynamicsLink
-from linkwind.dynamics.recorder import Recorder
+from linkwind.dynamics.recorder import Recorder, tables_sha256
 from linkwind.dynamics.service import DynamicsService, Result
 from linkwind.errors import LinkwindError
+from linkwind.log.writer import LogWriter
 from linkwind.mechanism import build
 from linkwind.runs import folder as folders
 from linkwind.runs.children import children
@@ -110,13 +111,10 @@ def _drive(
 
     log, report = folder / "log.mcap", folder / "report.html"
     try:
-        with terminate_as_interrupt(), Recorder(log, service.session.run, scenario) as recorder:
-            link = open_link()
-            try:
-                result = service.run(link, recorder, progress, poll)
-                recorder.complete(result.final_state_sha256)
-            finally:
-                link.close()
+        with terminate_as_interrupt(), _open_log(log, scenario, service) as writer, closing(open_link()) as link:
+            recorder = Recorder(writer, scenario, service.mechanism, service.multibody)
+            result = service.run(link, recorder, progress, poll)
+            writer.close(final_state_sha256=result.final_state_sha256)
     except LinkwindError as error:
         if log.exists():
             write_report(log, report)
@@ -124,6 +122,17 @@ def _drive(
         raise
     write_report(log, report)
     return Outcome(scenario.name, result, log, report)
+
+
+def _open_log(path: Path, scenario: Scenario, service: DynamicsService) -> LogWriter:
+    return LogWriter(
+        path,
+        run=service.session.run,
+        scenario_json=scenario.to_json(),
+        body_names=service.mechanism.bodies,
+        provider_bodies=service.session.providers,
+        metadata={"tables_sha256": tables_sha256(service.mechanism)},
+    )
 
 
 def zenoh_link(
