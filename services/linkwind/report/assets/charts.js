@@ -1,0 +1,164 @@
+// The plots: one plotly figure a row, one time range and one cursor for all of them.
+
+const MARGIN = { l: 62, r: 10, t: 6, b: 8 };
+const BOTTOM = 36; // of a row that carries the time axis
+
+function theme() {
+  const style = getComputedStyle(document.documentElement);
+  return (name) => style.getPropertyValue(`--${name}`).trim();
+}
+
+const bodyColour = (index) => `c${index % 8}`;
+const DASHES = ["solid", "dash", "dot", "dashdot"];
+
+// Numbers of one row all have the same number of decimals, so that they do not jump.
+function formatter(row) {
+  let largest = 0;
+  for (const curve of row.curves) for (const y of curve.y) if (Math.abs(y) > largest && isFinite(y)) largest = Math.abs(y);
+  if (row.log || largest >= 1e5 || (largest > 0 && largest < 1e-2)) return (y) => y.toExponential(1).replace("-", "−");
+  const decimals = row.whole ? 0 : Math.min(4, Math.max(largest < 1000 ? 1 : 0, 2 - Math.floor(Math.log10(largest || 1))));
+  return (y) => y.toFixed(decimals).replace("-", "−");
+}
+
+// Ticks of a logarithmic axis at 1, 2 and 5 times the powers of ten.
+function decades([low, high]) {
+  const values = [];
+  for (let power = Math.floor(low); power <= high; power++) {
+    for (const digit of [1, 2, 5]) values.push(digit * 10 ** power);
+  }
+  return { tickvals: values, ticktext: values.map(String) };
+}
+
+function layoutOf(row, range, colour) {
+  const axis = {
+    gridcolor: colour("grid"), zerolinecolor: colour("line"), linecolor: colour("line"), ticks: "outside",
+    tickcolor: colour("line"), ticklen: 4, exponentformat: "power", automargin: false,
+  };
+  const bottom = row.last ? BOTTOM : MARGIN.b;
+  return {
+    margin: { ...MARGIN, b: bottom }, showlegend: false, hovermode: false, bargap: 0.04,
+    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+    font: { family: "system-ui, sans-serif", size: 12, color: colour("soft") },
+    xaxis: {
+      ...axis, range: [...range], type: row.bars ? "log" : "linear", showticklabels: row.last,
+      title: row.last ? { text: row.bars ? row.xlabel : "t [s]", standoff: 2 } : undefined, nticks: 6,
+      ...(row.bars ? decades(range) : {}),
+    },
+    yaxis: {
+      ...axis, title: { text: row.label, standoff: 4 }, type: row.log ? "log" : "linear", nticks: 5, zeroline: !row.log,
+      rangemode: row.bars ? "tozero" : "normal", tickformat: row.whole ? "d" : undefined,
+      dtick: row.log ? undefined : row.whole ? 1 : undefined,
+    },
+  };
+}
+
+function tracesOf(row, colour) {
+  if (row.bars) {
+    const [curve] = row.curves;
+    return [{ type: "bar", x: curve.x, width: curve.width, y: curve.y, marker: { color: colour("accent") } }];
+  }
+  return row.curves.map((curve) => ({
+    type: "scatter", mode: curve.x.length > 1 ? "lines" : "markers", x: curve.x, y: curve.y, connectgaps: false,
+    line: {
+      color: colour(bodyColour(curve.colour)), width: 1.6, dash: DASHES[Math.floor(curve.colour / 8) % 4],
+      shape: row.whole ? "hv" : "linear",
+    },
+  }));
+}
+
+function makeRow(row, card) {
+  const holder = card.appendChild(document.createElement("div"));
+  holder.className = "row";
+  const readout = holder.appendChild(document.createElement("div"));
+  readout.className = "readout";
+  const plot = holder.appendChild(document.createElement("div"));
+  plot.className = row.last ? "plot last" : "plot";
+  const cursor = document.createElement("div");
+  cursor.className = "cursor";
+  cursor.style.height = `calc(100% - ${MARGIN.t + (row.last ? BOTTOM : MARGIN.b)}px)`;
+  const format = formatter(row);
+  const values = row.bars ? [] : row.curves.map((curve) => {
+    const item = readout.appendChild(document.createElement("span"));
+    item.style.setProperty("--colour", `var(--${bodyColour(curve.colour)})`);
+    item.append(curve.name, " ", document.createElement("b"));
+    return item.lastChild;
+  });
+  const show = (t) => row.curves.forEach((curve, i) => {
+    const y = curve.y[indexAt(curve.x, t + 1e-12 * Math.abs(t))];
+    values[i].textContent = Number.isFinite(y) ? format(y) : "–";
+  });
+  return { ...row, plot, cursor, show };
+}
+
+function makeCharts(panels, clock, host) {
+  const coarse = matchMedia("(pointer: coarse)").matches; // fingers scroll the page, they do not zoom plots
+  const config = {
+    displaylogo: false, responsive: true, staticPlot: coarse, displayModeBar: false, doubleClick: false,
+  };
+  const pad = clock.last > clock.first ? 0 : 0.5;
+  const full = [clock.first - pad, clock.last + pad];
+  let range = full;
+  const rows = [];
+
+  for (const panel of panels) {
+    const card = host.appendChild(document.createElement("article"));
+    card.className = "card";
+    card.appendChild(document.createElement("h2")).textContent = panel.title;
+    if (panel.note) card.appendChild(document.createElement("p")).textContent = panel.note;
+    panel.rows.forEach((row, i) => {
+      for (const curve of row.curves) {
+        curve.y = unpack(curve.y);
+        curve.x = curve.x ? unpack(curve.x) : clock.series;
+        if (curve.width) curve.width = unpack(curve.width);
+      }
+      rows.push(makeRow({ ...row, last: i === panel.rows.length - 1 || row.bars }, card));
+    });
+  }
+  const timed = rows.filter((row) => !row.bars);
+  const spanOf = (row) => row.bars
+    ? [Math.log10(row.curves[0].x[0]) - 0.1, Math.log10(row.curves[0].x.at(-1)) + 0.1] : range;
+
+  function place(t) {
+    for (const { plot, cursor } of timed) {
+      const part = (t - range[0]) / (range[1] - range[0]);
+      cursor.hidden = part < 0 || part > 1;
+      cursor.style.transform = `translateX(${MARGIN.l + part * (plot.clientWidth - MARGIN.l - MARGIN.r)}px)`;
+    }
+  }
+
+  function zoom(to) {
+    if (to[0] === range[0] && to[1] === range[1]) return;
+    range = to;
+    for (const { plot } of timed) Plotly.relayout(plot, { "xaxis.range": [...range], "yaxis.autorange": true });
+    place(clock.t);
+  }
+
+  function listen(row) {
+    const { plot } = row;
+    const timeOf = (event) => {
+      const box = plot.getBoundingClientRect();
+      const part = (event.clientX - box.left - MARGIN.l) / (box.width - MARGIN.l - MARGIN.r);
+      return part < 0 || part > 1 ? null : range[0] + part * (range[1] - range[0]);
+    };
+    const move = (event) => { const t = timeOf(event); if (t !== null) clock.seek(t); };
+    plot.addEventListener("pointerdown", (event) => { clock.pause(); move(event); }, true);
+    plot.addEventListener("pointermove", (event) => {
+      if (!clock.playing && event.buttons === 0 && event.pointerType === "mouse") move(event);
+    }, true);
+    plot.addEventListener("dblclick", () => zoom(full), true);
+    plot.on("plotly_relayout", (change) => {
+      if ("xaxis.range[0]" in change) zoom([change["xaxis.range[0]"], change["xaxis.range[1]"]]);
+    });
+  }
+
+  function draw() {
+    const colour = theme();
+    for (const row of rows) Plotly.react(row.plot, tracesOf(row, colour), layoutOf(row, spanOf(row), colour), config);
+  }
+
+  draw();
+  for (const row of timed) { row.plot.append(row.cursor); listen(row); }
+  clock.listen((t) => { place(t); for (const row of timed) row.show(t); });
+  new ResizeObserver(() => place(clock.t)).observe(host);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+}

@@ -1,0 +1,314 @@
+// The moving mechanism on a canvas: orthographic, straight on for planar motion, orbited by drag in 3-D.
+
+const GHOSTS = 8; // earlier poses left standing over a whole run
+
+const add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+const mix = (a, b, f) => a + (b - a) * f;
+const length = (a) => Math.hypot(...a);
+
+// The vector v turned by the unit quaternion (w, x, y, z).
+function turned([w, x, y, z], v) {
+  const a = 2 * (y * v[2] - z * v[1]), b = 2 * (z * v[0] - x * v[2]), c = 2 * (x * v[1] - y * v[0]);
+  return [v[0] + w * a + y * c - z * b, v[1] + w * b + z * a - x * c, v[2] + w * c + x * b - y * a];
+}
+
+// The largest 1, 2 or 5 times a power of ten that is not above the value.
+function nice(value) {
+  const power = 10 ** Math.floor(Math.log10(value));
+  return power * [5, 2, 1].find((digit) => digit * power <= value * (1 + 1e-9));
+}
+
+const number = (value) => String(Number(value.toPrecision(3)));
+
+// Poses and forces at any time, from the frames: linear between two of them.
+function makeMotion(scene, times) {
+  const position = unpack(scene.position), orientation = unpack(scene.orientation), force = unpack(scene.force);
+  const n = scene.bodies.length, all = times.length;
+  const total = scene.bodies.reduce((sum, body) => sum + body.mass, 0);
+
+  function poses(t) {
+    const i = indexAt(times, t), j = Math.min(i + 1, all - 1);
+    const f = j > i ? (t - times[i]) / (times[j] - times[i]) : 0;
+    const between = (array, width, b, k) => mix(array[(i * n + b) * width + k], array[(j * n + b) * width + k], f);
+    return scene.bodies.map((_, b) => {
+      const q = [0, 1, 2, 3].map((k) => between(orientation, 4, b, k));
+      const size = Math.hypot(...q);
+      return {
+        at: [0, 1, 2].map((k) => between(position, 3, b, k)),
+        q: q.map((part) => part / size),
+        force: [0, 1, 2].map((k) => between(force, 3, b, k)),
+      };
+    });
+  }
+
+  const centre = (now) => [0, 1, 2].map(
+    (k) => now.reduce((sum, pose, b) => sum + pose.at[k] * scene.bodies[b].mass, 0) / total);
+
+  let largest = 0;
+  for (let i = 0; i < force.length; i += 3) {
+    const size = Math.hypot(force[i], force[i + 1], force[i + 2]);
+    if (size > largest && isFinite(size)) largest = size;
+  }
+  return { poses, centre, largest };
+}
+
+// Turns and scales W to the screen. `angle` and `tilt` are the orbit of a 3-D scene.
+function makeCamera(scene) {
+  const camera = { angle: scene.planar ? 0 : -0.6, tilt: scene.planar ? 0 : 0.35, centre: [0, 0, 0], scale: 1, w: 1, h: 1 };
+  camera.turn = (p) => { // right, up, towards the viewer
+    const [x, y, z] = scene.up === "z" ? [p[0], p[2], -p[1]] : p;
+    const ca = Math.cos(camera.angle), sa = Math.sin(camera.angle), ce = Math.cos(camera.tilt), se = Math.sin(camera.tilt);
+    const depth = -x * sa + z * ca;
+    return [x * ca + z * sa, y * ce - depth * se, y * se + depth * ce];
+  };
+  camera.project = (p) => {
+    const [x, y, z] = camera.turn(p), c = camera.turn(camera.centre);
+    return [camera.w / 2 + (x - c[0]) * camera.scale, camera.h / 2 - (y - c[1]) * camera.scale, z];
+  };
+  return camera;
+}
+
+// How far the run reaches (a box in W), and the mechanism from its own centre of mass.
+function extents(scene, motion, times) {
+  const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+  let reach = 0;
+  const stride = Math.max(1, Math.floor(times.length / 400));
+  for (let i = 0; i < times.length; i += stride) {
+    const now = motion.poses(times[i]), middle = motion.centre(now);
+    now.forEach((pose, b) => {
+      const at = length(pose.at.map((x, k) => x - middle[k])) + scene.bodies[b].reach;
+      if (!isFinite(at)) return;
+      reach = Math.max(reach, at);
+      for (let k = 0; k < 3; k++) {
+        low[k] = Math.min(low[k], pose.at[k] - scene.bodies[b].reach);
+        high[k] = Math.max(high[k], pose.at[k] + scene.bodies[b].reach);
+      }
+    });
+  }
+  return { low, high, reach: reach || 1 };
+}
+
+function arrow(pen, from, to, head) {
+  const angle = Math.atan2(to[1] - from[1], to[0] - from[0]), size = Math.hypot(to[0] - from[0], to[1] - from[1]);
+  if (!(size > 1)) return;
+  const tip = Math.min(head, size * 0.6);
+  pen.beginPath();
+  pen.moveTo(from[0], from[1]);
+  pen.lineTo(to[0] - 0.7 * tip * Math.cos(angle), to[1] - 0.7 * tip * Math.sin(angle));
+  pen.stroke();
+  pen.beginPath();
+  pen.moveTo(to[0], to[1]);
+  for (const side of [-0.42, 0.42]) pen.lineTo(to[0] - tip * Math.cos(angle + side), to[1] - tip * Math.sin(angle + side));
+  pen.closePath();
+  pen.fill();
+}
+
+function makeScene(canvas, scene, clock) {
+  const pen = canvas.getContext("2d"), follow = document.getElementById("follow");
+  const { times } = clock, motion = makeMotion(scene, times), camera = makeCamera(scene);
+  const world = extents(scene, motion, times);
+  const size = world.high.map((x, k) => x - world.low[k]);
+  follow.checked = length(size) > 14 * world.reach;
+  const path = times.map ? Array.from(times, (t) => motion.centre(motion.poses(t))) : [];
+  const windSpeed = length(scene.wind);
+  let colour = theme();
+
+  function aim(now) {
+    const room = Math.min(camera.w, camera.h);
+    const middle = world.low.map((x, k) => x + size[k] / 2);
+    if (follow.checked) {
+      camera.centre = motion.centre(now);
+      camera.scale = room / (2.7 * world.reach);
+    } else {
+      camera.centre = middle;
+      const [w, h] = scene.planar ? size : [length(size), length(size)];
+      camera.scale = Math.min((camera.w - 60) / w, (camera.h - 110) / h);
+    }
+  }
+
+  function grid() {
+    const step = 1 / nice(camera.scale / 64); // at least 64 px, and 1, 2 or 5 times a power of ten
+    const [x0, y0] = [camera.centre[0] - camera.w / 2 / camera.scale, camera.centre[1] - camera.h / 2 / camera.scale];
+    pen.strokeStyle = colour("grid");
+    pen.fillStyle = colour("soft");
+    pen.lineWidth = 1;
+    pen.globalAlpha = 1;
+    const text = (value) => `${number(Math.abs(value) < step / 2 ? 0 : value)}`.replace("-", "−");
+    pen.textAlign = "center";
+    for (let x = Math.ceil(x0 / step) * step; x < x0 + camera.w / camera.scale; x += step) {
+      const [px] = camera.project([x, 0, 0]);
+      pen.beginPath(); pen.moveTo(px, 0); pen.lineTo(px, camera.h); pen.stroke();
+      if (px > 40 && px < camera.w - 20) pen.fillText(text(x), px, camera.h - 5);
+    }
+    pen.textAlign = "left";
+    for (let y = Math.ceil(y0 / step) * step; y < y0 + camera.h / camera.scale; y += step) {
+      const py = camera.project([0, y, 0])[1];
+      pen.beginPath(); pen.moveTo(0, py); pen.lineTo(camera.w, py); pen.stroke();
+      if (py > 60 && py < camera.h - 52) pen.fillText(text(y), 4, py - 3);
+    }
+    pen.fillText("m", 4, camera.h - 5);
+  }
+
+  // The undisturbed wind as streaks that drift with it, in the world that the camera looks at.
+  function streaks(t) {
+    if (!windSpeed) return;
+    const wind = camera.turn(scene.wind), c = camera.turn(camera.centre);
+    pen.strokeStyle = colour("wind");
+    pen.globalAlpha = 0.35;
+    pen.lineWidth = 1.2;
+    const wrap = (value, period) => ((value % period) + period) % period;
+    const w = camera.w + 80, h = camera.h + 80;
+    for (let i = 0; i < 36; i++) {
+      const x = wrap(0.7548777 * i * w + (wind[0] * t - c[0]) * camera.scale, w) - 40;
+      const y = wrap(0.5698403 * i * h - (wind[1] * t - c[1]) * camera.scale, h) - 40;
+      pen.beginPath(); pen.moveTo(x, y); pen.lineTo(x - 26 * wind[0] / windSpeed, y + 26 * wind[1] / windSpeed); pen.stroke();
+    }
+    pen.globalAlpha = 1;
+  }
+
+  function trail(t) {
+    for (const [alpha, until] of [[0.3, Infinity], [0.9, t]]) {
+      pen.beginPath();
+      path.forEach((p, i) => { if (times[i] <= until) pen.lineTo(...camera.project(p).slice(0, 2)); });
+      pen.globalAlpha = alpha;
+      pen.strokeStyle = colour("soft");
+      pen.lineWidth = 1.3;
+      pen.setLineDash(alpha < 0.5 ? [3, 4] : []);
+      pen.stroke();
+    }
+    pen.setLineDash([]);
+    pen.globalAlpha = 1;
+  }
+
+  function bodies(now, alpha) {
+    const order = now.map((pose, b) => [camera.turn(pose.at)[2], b]).sort((p, q) => p[0] - q[0]);
+    for (const [, b] of order) {
+      const { outline, closed } = scene.bodies[b], pose = now[b];
+      pen.strokeStyle = pen.fillStyle = colour(bodyColour(b));
+      pen.lineJoin = pen.lineCap = "round";
+      pen.lineWidth = Math.max(3.5, (scene.planar ? 0.05 : 0.02) * scene.bodies[b].reach * camera.scale);
+      pen.beginPath();
+      for (const point of outline) pen.lineTo(...camera.project(add(pose.at, turned(pose.q, point))).slice(0, 2));
+      if (closed) { pen.closePath(); pen.globalAlpha = 0.28 * alpha; pen.fill(); }
+      pen.globalAlpha = alpha;
+      pen.stroke();
+    }
+    pen.globalAlpha = 1;
+  }
+
+  function joints(now) {
+    for (const joint of scene.joints) {
+      const pose = now[joint.body], [x, y] = camera.project(add(pose.at, turned(pose.q, joint.point)));
+      pen.beginPath();
+      pen.arc(x, y, 4.5, 0, 2 * Math.PI);
+      pen.fillStyle = colour("card"); pen.strokeStyle = colour("ink"); pen.lineWidth = 2;
+      pen.fill(); pen.stroke();
+    }
+  }
+
+  const forceScale = () => 0.28 * Math.min(camera.w, camera.h) / (motion.largest || 1) / camera.scale; // m per N
+
+  function forces(now) {
+    if (!motion.largest) return;
+    pen.strokeStyle = pen.fillStyle = colour("force");
+    pen.lineWidth = 2.2;
+    for (const pose of now) {
+      const tip = add(pose.at, pose.force.map((x) => x * forceScale()));
+      arrow(pen, camera.project(pose.at), camera.project(tip), 11);
+    }
+    pen.fillStyle = colour("ink");
+    for (const pose of now) {
+      const [x, y] = camera.project(pose.at);
+      pen.beginPath(); pen.arc(x, y, 2.4, 0, 2 * Math.PI); pen.fill();
+    }
+  }
+
+  // Scales and directions, on strips that keep them readable.
+  function key() {
+    pen.fillStyle = colour("card");
+    pen.globalAlpha = 0.82;
+    pen.fillRect(0, camera.h - 44, camera.w, 26);
+    if (windSpeed) pen.fillRect(0, 8, 200, 34);
+    pen.globalAlpha = 1;
+    pen.textAlign = "left";
+    pen.lineWidth = 2;
+    const metres = nice(90 / camera.scale), bar = metres * camera.scale;
+    let x = 12;
+    const y = camera.h - 26;
+    pen.strokeStyle = pen.fillStyle = colour("ink");
+    pen.beginPath();
+    pen.moveTo(x, y - 4); pen.lineTo(x, y); pen.lineTo(x + bar, y); pen.lineTo(x + bar, y - 4);
+    pen.stroke();
+    pen.fillText(`${number(metres)} m`, x + bar + 7, y + 1);
+    x += bar + 62;
+    if (motion.largest) {
+      const unit = forceScale() * camera.scale, newton = nice(80 / unit);
+      pen.strokeStyle = pen.fillStyle = colour("force");
+      arrow(pen, [x, y - 3], [x + newton * unit, y - 3], 11);
+      pen.fillText(`${number(newton)} N aerodynamic force`, x + newton * unit + 7, y + 1);
+    }
+    if (windSpeed) {
+      const along = camera.turn(scene.wind).map((part) => part / windSpeed * 46);
+      pen.strokeStyle = pen.fillStyle = colour("wind");
+      arrow(pen, [38 - along[0] / 2, 26 + along[1] / 2], [38 + along[0] / 2, 26 - along[1] / 2], 11);
+      pen.fillText(`wind ${number(windSpeed)} m/s${scene.gusts ? ", with gusts" : ""}`, 70, 30);
+    }
+    if (!scene.planar) triad();
+  }
+
+  function triad() {
+    const at = [camera.w - 44, 48];
+    pen.strokeStyle = pen.fillStyle = colour("soft");
+    ["x", "y", "z"].forEach((name, k) => {
+      const [dx, dy] = camera.turn([0, 1, 2].map((i) => (i === k ? 30 : 0)));
+      pen.lineWidth = 1.5;
+      arrow(pen, at, [at[0] + dx, at[1] - dy], 7);
+      pen.fillText(name, at[0] + 1.25 * dx - 3, at[1] - 1.25 * dy + 4);
+    });
+  }
+
+  function draw() {
+    const ratio = window.devicePixelRatio || 1;
+    const t = clock.t, now = motion.poses(t);
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    pen.clearRect(0, 0, camera.w, camera.h);
+    pen.font = "12px system-ui, sans-serif";
+    aim(now);
+    if (scene.planar) grid();
+    streaks(t);
+    trail(t);
+    for (let i = 0; i < GHOSTS; i++) {
+      const then = clock.first + (clock.last - clock.first) * i / GHOSTS;
+      if (then < t) bodies(motion.poses(then), 0.22);
+    }
+    bodies(now, 1);
+    forces(now);
+    joints(now);
+    key();
+  }
+
+  function resize() {
+    const ratio = window.devicePixelRatio || 1;
+    camera.w = canvas.clientWidth;
+    camera.h = canvas.clientHeight;
+    canvas.width = Math.round(camera.w * ratio);
+    canvas.height = Math.round(camera.h * ratio);
+    draw();
+  }
+
+  if (!scene.planar) {
+    canvas.classList.add("orbit");
+    canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
+    canvas.addEventListener("pointermove", (event) => {
+      if (!event.buttons) return;
+      camera.angle -= event.movementX * 0.01;
+      camera.tilt = Math.max(-1.5, Math.min(1.5, camera.tilt + event.movementY * 0.01));
+      draw();
+    });
+  }
+  follow.addEventListener("change", draw);
+  new ResizeObserver(resize).observe(canvas);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { colour = theme(); draw(); });
+  resize();
+  clock.listen(draw);
+}

@@ -1,0 +1,146 @@
+"""What the page needs of a run, as numbers: read from the log, no HTML."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwind.log.contents import STATE, STEP, TIMING
+from linkwind.log.reader import Log, open_log
+from linkwind.log.tables import Trajectory
+from linkwind.spatial import Array
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run, complete or not.
+
+    Attributes:
+        scenario: the resolved scenario, as its canonical JSON holds it.
+        complete: whether the run came to its end.
+        error: what ended it early, or is wrong with its log; None if nothing is known.
+        versions: versions and hashes, by name.
+        trajectory: the accepted states, shape (k, …); k may be 0.
+        coupling_time: t of each exchange [s], shape (m,).
+        order: degree of the extrapolation, shape (m,).
+        extrapolation_error: E_0 … E_p by degree, shape (m, p+1), NaN where not measured.
+        exchange: wall time of each exchange [s], shape (m,).
+    """
+
+    scenario: Mapping[str, Any]
+    complete: bool
+    error: str | None
+    versions: Mapping[str, str]
+    trajectory: Trajectory
+    coupling_time: Array
+    order: NDArray[Any]
+    extrapolation_error: Array
+    exchange: Array
+
+    @property
+    def steps(self) -> int:
+        """Communication steps that were accepted."""
+        return max(0, len(self.trajectory.t) - 1)
+
+    @property
+    def planned_steps(self) -> int:
+        """Communication steps that the scenario asks for."""
+        end, step = float(self.scenario["time"]["end"]), float(self.scenario["coupling"]["step"])
+        return round(end / step)
+
+    @property
+    def bodies(self) -> list[str]:
+        """Names of the bodies, in scenario order."""
+        return [body["name"] for body in self.scenario["bodies"]]
+
+    @property
+    def joint_of(self) -> list[Mapping[str, Any] | None]:
+        """The scenario's joint that carries each body; None where the body moves freely."""
+        carried = {joint["child"]: joint for joint in self.scenario.get("joints", ())}
+        return [carried.get(name) for name in self.bodies]
+
+    @cached_property
+    def planar(self) -> bool:
+        """Whether everything stays in a plane of constant z and turns about z only."""
+        path = self.trajectory
+        turn = np.abs(path.orientation[:, :, 1:3])
+        lift = np.abs(path.position[:, :, 2] - path.position[:1, :, 2])
+        return bool(np.all(turn < 1e-9) and np.all(lift < 1e-9))
+
+    @property
+    def energy_residual(self) -> Array:
+        """Change of kinetic + potential - external + dissipated since the start [J], shape (k,)."""
+        path = self.trajectory
+        balance = path.kinetic_energy + path.potential_energy - path.external_work + path.dissipated_work
+        return balance - balance[:1]
+
+    @property
+    def largest_force(self) -> float | None:
+        """Largest aerodynamic force on a body [N]."""
+        return largest(np.linalg.norm(self.trajectory.wrench[:, :, :3], axis=-1))
+
+    @property
+    def largest_gap(self) -> float | None:
+        """Largest distance of two joint points [m]; None without joints."""
+        return largest(self.trajectory.joint_gap) if self.scenario.get("joints") else None
+
+    @property
+    def final_state_sha256(self) -> str | None:
+        """SHA-256 of the last state: little-endian float64, per body x y z qw qx qy qz vx vy vz wx wy wz."""
+        path = self.trajectory
+        if not len(path.t):
+            return None
+        parts = (path.position[-1], path.orientation[-1], path.linear[-1], path.angular[-1])
+        return hashlib.sha256(np.hstack(parts).astype("<f8").tobytes()).hexdigest()
+
+
+def largest(values: Array) -> float | None:
+    """Return the largest finite value, or None."""
+    finite = values[np.isfinite(values)]
+    return float(finite.max()) if finite.size else None
+
+
+def read(path: Path) -> Run:
+    """Read a run from its MCAP log, which may be cut short.
+
+    Raises:
+        LogError: the file is missing, not a log of linkwind, or damaged before its scenario.
+    """
+    log = open_log(path)
+    scenario = json.loads(log.scenario_json)
+    # A run that ended before its first state, or a log that was cut, may lack a topic.
+    coupling = log.steps_table() if STEP in log.topics else None
+    return Run(
+        scenario=scenario,
+        complete=log.complete,
+        error=_trouble(log),
+        versions=log.versions,
+        trajectory=log.trajectory() if STATE in log.topics else no_trajectory(len(scenario["bodies"])),
+        coupling_time=coupling.t if coupling else np.empty(0),
+        order=coupling.order if coupling else np.empty(0),
+        extrapolation_error=coupling.extrapolation_error if coupling else np.empty((0, 0)),
+        exchange=log.timing().exchange_ns / np.float64(1e9) if TIMING in log.topics else np.empty(0),
+    )
+
+
+def no_trajectory(n: int) -> Trajectory:
+    """Return a trajectory of ``n`` bodies without a single state."""
+    widths = {"position": 3, "orientation": 4, "linear": 3, "angular": 3}
+    widths |= {"acceleration": 6, "reaction": 6, "wrench": 6}
+    blank: dict[str, Any] = dict.fromkeys(Trajectory._fields, np.empty(0))
+    blank |= {name: np.empty((0, n, width)) for name, width in widths.items()}
+    blank |= {"q": np.empty((0, 0)), "v": np.empty((0, 0)), "step": np.empty(0, np.uint64)}
+    return Trajectory(**blank)
+
+
+def _trouble(log: Log) -> str | None:
+    damage = f"The log is damaged: {log.damage.text}" if log.damage else None
+    return "\n".join(text for text in (log.error, damage) if text) or None

@@ -1,0 +1,58 @@
+"""The page itself: a run to one HTML file that needs no network."""
+
+from __future__ import annotations
+
+import json
+from html import escape
+from importlib.resources import files
+from string import Template
+from typing import Any
+
+from plotly.offline import get_plotlyjs
+
+from linkwind.report.arrays import pack
+from linkwind.report.data import Run
+from linkwind.report.header import badge, banner, note, tiles
+from linkwind.report.panels import panels
+from linkwind.report.scene import scene
+from linkwind.report.tables import tables
+
+_ASSETS = files("linkwind.report").joinpath("assets")
+_SCRIPTS = ("clock.js", "charts.js", "scene.js", "main.js")
+
+
+def render(run: Run) -> str:
+    """Return the report of a run as one self-contained HTML document."""
+    name = run.scenario["name"]
+    return Template(_asset("page.html")).substitute(
+        title=escape(f"{name} · linkwind"),
+        name=escape(name),
+        badge=badge(run),
+        description=escape(run.scenario.get("description", "")),
+        banner=banner(run),
+        tiles=tiles(run),
+        note=note(run),
+        tables=tables(run),
+        data=script_json(_data(run)),
+        css=_asset("page.css"),
+        plotly=get_plotlyjs(),
+        script="\n".join(map(_asset, _SCRIPTS)),
+    )
+
+
+def script_json(value: Any) -> str:
+    """Return JSON that can stand in a script element, whatever text is in it."""
+    text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
+
+
+def _asset(name: str) -> str:
+    return _ASSETS.joinpath(name).read_text(encoding="utf-8")
+
+
+def _data(run: Run) -> dict[str, Any]:
+    """Return the data block: the scene, the plots, and the times that curves without ``x`` share."""
+    moving = scene(run)
+    if moving is None:
+        return {"scene": None}
+    return {"scene": moving, "t": pack(run.trajectory.t, "f8"), "panels": panels(run)}

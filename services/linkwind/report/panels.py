@@ -1,0 +1,158 @@
+"""The plots of a run as plain data: panels of rows of curves, thinned and packed for the page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from linkwind.report.arrays import pack, peaks
+from linkwind.report.data import Run, largest
+from linkwind.spatial import Array
+
+POINTS = 2000  # of a curve
+MANY_BODIES = 8  # more of them share the points of this many
+
+_PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+_MOTION_AXES = {True: (0, 1), False: (0, 1, 2)}
+_TURN_AXES = {True: (2,), False: (0, 1, 2)}
+
+
+def points_per_curve(run: Run) -> int:
+    """Return the most points that a curve of this run gets on the page."""
+    return POINTS * MANY_BODIES // max(MANY_BODIES, len(run.bodies))
+
+
+def panels(run: Run) -> list[dict[str, Any]]:
+    """Return the plots of a run in reading order; those that have nothing to show are left out."""
+    every = (_velocity, _aerodynamic, _joints, _energy, _coupling, _exchange)
+    made = (panel(run) for panel in every)
+    return [panel for panel in made if panel is not None]
+
+
+def prefixed(value: float, unit: str) -> tuple[float, str]:
+    """Return the factor and the unit with an SI prefix that bring a value between 1 and 1000."""
+    exponent = 0 if value == 0.0 else 3 * int(np.floor(np.log10(value) / 3))
+    exponent = min(9, max(-15, exponent))
+    return 10.0**-exponent, _PREFIXES[exponent] + unit
+
+
+def _panel(title: str, rows: Sequence[dict[str, Any]], note: str = "") -> dict[str, Any]:
+    return {"title": title, "note": note, "rows": list(rows)}
+
+
+def _row(label: str, *curves: dict[str, Any], **how: bool | str) -> dict[str, Any]:
+    """Return one pair of axes; ``how``: log, whole (numbers), bars with their xlabel."""
+    return {"label": label, "curves": list(curves), **how}
+
+
+def _curve(run: Run, name: str, colour: int, y: Array, t: Array | None = None) -> dict[str, Any]:
+    """Return one curve; ``x`` is left out where it is the trajectory's own times, not thinned."""
+    keep = peaks(y, points_per_curve(run))
+    shared = t is None and keep.size == y.size
+    times = run.trajectory.t if t is None else t
+    return {"name": name, "colour": colour, "y": pack(y[keep])} | (
+        {} if shared else {"x": pack(times[keep], "f8")}
+    )
+
+
+def _body_rows(run: Run, labels: Sequence[str], columns: Array) -> list[dict[str, Any]]:
+    """Return a row for each component of ``columns``, shape (k, n, components), a curve for each body."""
+    return [
+        _row(label, *(_curve(run, name, i, columns[:, i, c]) for i, name in enumerate(run.bodies)))
+        for c, label in enumerate(labels)
+    ]
+
+
+def _labels(symbol: str, axes: Sequence[int], unit: str) -> list[str]:
+    return [f"{symbol}<sub>{'xyz'[axis]}</sub> [{unit}]" for axis in axes]
+
+
+def _velocity(run: Run) -> dict[str, Any]:
+    move, turn = _MOTION_AXES[run.planar], _TURN_AXES[run.planar]
+    path = run.trajectory
+    rows = _body_rows(run, _labels("V", move, "m/s"), path.linear[:, :, move])
+    turning = ["ω [rad/s]"] if run.planar else _labels("ω", turn, "rad/s")
+    rows += _body_rows(run, turning, path.angular[:, :, turn])
+    return _panel("Velocity", rows, "Of the centres of mass, in the world frame.")
+
+
+def _aerodynamic(run: Run) -> dict[str, Any]:
+    move, turn = _MOTION_AXES[run.planar], tuple(3 + axis for axis in _TURN_AXES[run.planar])
+    wrench = run.trajectory.wrench
+    rows = _body_rows(run, _labels("F", move, "N"), wrench[:, :, move])
+    turning = ["M [N·m]"] if run.planar else _labels("M", _TURN_AXES[False], "N·m")
+    rows += _body_rows(run, turning, wrench[:, :, turn])
+    note = "At the centres of mass, added mass included."
+    return _panel("Aerodynamic force", rows, note)
+
+
+def _joints(run: Run) -> dict[str, Any] | None:
+    jointed = [(i, joint["name"]) for i, joint in enumerate(run.joint_of) if joint is not None]
+    if not jointed:
+        return None
+    axes = _MOTION_AXES[run.planar]
+    rows = [
+        _row(label, *(_curve(run, name, i, run.trajectory.reaction[:, i, axis]) for i, name in jointed))
+        for axis, label in zip(axes, _labels("R", axes, "N"), strict=True)
+    ]
+    rows += _gap(run)
+    return _panel("Joints", rows, "Force of the parent on the child, in its colour.")
+
+
+def _energy(run: Run) -> dict[str, Any]:
+    path, residual = run.trajectory, run.energy_residual
+    factor, unit = prefixed(largest(np.abs(residual)) or 0.0, "J")
+    parts = {
+        "kinetic": path.kinetic_energy,
+        "potential": path.potential_energy,
+        "work of the air": path.external_work,
+        "dampers": path.dissipated_work,
+    }
+    rows = [
+        _row("E [J]", *(_curve(run, name, 2 + i, y) for i, (name, y) in enumerate(parts.items()))),
+        _row(f"ΔE [{unit}]", _curve(run, "kinetic + potential − work + dampers", 7, residual * factor)),
+    ]
+    return _panel("Energy balance", rows, "Below: what it is off by, since t₀.")
+
+
+def _gap(run: Run) -> list[dict[str, Any]]:
+    """Return the row of the largest distance of two points that a joint holds together."""
+    factor, unit = prefixed(run.largest_gap or 0.0, "m")
+    gap = run.trajectory.joint_gap * factor
+    return [_row(f"gap [{unit}]", _curve(run, "largest distance of two joint points", 7, gap))]
+
+
+def _coupling(run: Run) -> dict[str, Any] | None:
+    t, errors = run.coupling_time, run.extrapolation_error
+    if not t.size:
+        return None
+    rows = [_row("degree [1]", _curve(run, "degree", 7, run.order.astype(float), t), whole=True)]
+    known = np.sqrt(np.where(errors > 0.0, errors, np.nan))  # a logarithmic axis has no zero
+    if np.isfinite(known).any():
+        curves = [_curve(run, f"√E{'₀₁₂₃'[d]}", 2 + d, known[:, d], t) for d in range(known.shape[1])]
+        rows.append(_row("√E<sub>d</sub> [m/s²]", *curves, log=True))
+    note = "Degree of the extrapolation; what each would have missed."
+    return _panel("Coupling", rows, note)
+
+
+def _exchange(run: Run) -> dict[str, Any] | None:
+    times = run.exchange[run.exchange > 0.0] * 1e6
+    if not times.size:
+        return None
+    edges = np.geomspace(times.min(), max(times.max(), times.min() * 1.01), 49)
+    counts, _ = np.histogram(times, edges)
+    bars = {
+        "name": "exchanges",
+        "colour": 0,
+        "x": pack(np.sqrt(edges[1:] * edges[:-1])),
+        "width": pack(np.diff(edges)),
+        "y": pack(counts),
+    }
+    row = _row("exchanges [1]", bars, bars=True, xlabel="wall time of an exchange [µs]")
+    shares = ", ".join(f"{name} {np.percentile(times, q):.4g} µs" for name, q in _PERCENTILES.items())
+    return _panel("Exchange time", [row], f"From putting the motion to having every wrench: {shares}.")
+
+
+_PERCENTILES = {"median": 50, "90 %": 90, "99 %": 99, "largest": 100}

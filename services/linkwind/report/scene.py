@@ -1,0 +1,86 @@
+"""The animated scene: bodies as outlines, joints as points, frames of poses and forces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from linkwind.report.arrays import every_nth, pack
+from linkwind.report.data import Run
+from linkwind.spatial import Array
+
+FRAMES = 1500
+
+
+def scene(run: Run) -> dict[str, Any] | None:
+    """Return what the animation needs; None where the log holds no state."""
+    path = run.trajectory
+    if not len(path.t):
+        return None
+    frames = every_nth(len(path.t), FRAMES)
+    environment = run.scenario["environment"]
+    gravity = np.abs(environment["gravity"])
+    return {
+        "t": pack(path.t[frames], "f8"),
+        "position": pack(path.position[frames]),
+        "orientation": pack(path.orientation[frames]),
+        "force": pack(path.wrench[frames, :, :3]),
+        "bodies": [_body(run, i) for i in range(len(run.bodies))],
+        "joints": [
+            {"name": joint["name"], "body": i, "point": joint["child_point"]}
+            for i, joint in enumerate(run.joint_of)
+            if joint is not None
+        ],
+        "planar": run.planar,
+        "up": "z" if not run.planar and gravity[2] > gravity[1] else "y",
+        "wind": environment["wind"],
+        "gusts": bool(environment["gusts"]),
+    }
+
+
+def _body(run: Run, index: int) -> dict[str, Any]:
+    body = run.scenario["bodies"][index]
+    outline, closed = _outline(body, _joint_points(run, body["name"]))
+    reach = float(np.linalg.norm(outline[:, : 2 if run.planar else 3], axis=1).max())
+    return {
+        "name": body["name"],
+        "mass": max(body["mass"], 1e-12),  # weights of a mean, which must not all be 0
+        "outline": outline.tolist(),
+        "closed": closed,
+        "reach": reach,
+    }
+
+
+def _joint_points(run: Run, name: str) -> Array:
+    """Return the points of a body where joints hold it, shape (m, 3), in its frame."""
+    points = []
+    for joint in run.scenario.get("joints", ()):
+        if joint["child"] == name:
+            points.append(joint["child_point"])
+        if joint["parent"] == name:
+            points.append(joint["parent_point"])
+    return np.array(points, dtype=float).reshape(-1, 3)
+
+
+def _outline(body: Mapping[str, Any], joint_points: Array) -> tuple[Array, bool]:
+    """Return a polygon in the body frame [m], shape (m, 3), and whether it is closed.
+
+    A plate is its rectangle. A body without a shape is a line through its joint points and its centre of
+    mass, or, where these coincide, a circle of its radius of gyration.
+    """
+    shape = body.get("shape")
+    if shape and shape["type"] == "plate":
+        half, side = 0.5 * shape["length"], 0.5 * shape["span"]
+        return np.array([[-half, 0, -side], [half, 0, -side], [half, 0, side], [-half, 0, side]]), True
+    if joint_points.size and np.abs(joint_points).max() > 0.0:
+        through = np.insert(joint_points, len(joint_points) // 2, 0.0, axis=0)
+        if len(joint_points) == 1:
+            through = np.vstack([joint_points[0], -joint_points[0]])  # as far beyond the centre of mass
+        return through, False
+    inertia = body["inertia"]
+    about_z = inertia if isinstance(inertia, float | int) else max(inertia[:3])
+    radius = float(np.sqrt(about_z / max(body["mass"], 1e-12)))
+    angle = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    return radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)]), True
