@@ -115,7 +115,7 @@ def _provider(scenario: Scenario, provider: Provider, path: Path) -> Iterator[Pr
             yield choice((*path, "field", name), "one of its bodies", provider.bodies, name)
     if provider.model == "field" and not provider.field:
         expected = "a table for at least one body"
-        advice = f'Add [{_first(provider.bodies)}] fx = "…" below it.'
+        advice = f'Add a table for a body, such as {_first(provider.bodies)}, with fx = "…".'
         yield Problem((*path, "field"), expected, "nothing", advice)
     if provider.model == "plate":
         for index, body in enumerate(scenario.bodies):

@@ -65,6 +65,6 @@ def _value(text: str) -> Any:
     try:
         parsed = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
-        return text
+        return text.strip()
     # A line break could smuggle in a second key.
-    return parsed["value"] if list(parsed) == ["value"] else text
+    return parsed["value"] if list(parsed) == ["value"] else text.strip()

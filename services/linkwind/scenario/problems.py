@@ -72,15 +72,22 @@ def item(path: Path) -> str:
     return text
 
 
-def show(value: Any) -> str:
+def show(value: Any, depth: int = 0) -> str:
     """Return a short, one-line rendering of a value, as TOML writes it."""
     if isinstance(value, dict):
-        return "a table"
-    try:
+        return "{…}" if depth else "a table"
+    if isinstance(value, list | tuple):
+        text = "…" if depth > 1 else ", ".join(show(entry, depth + 1) for entry in value[:8])
+        text = f"[{text}, …]" if len(value) > 8 else f"[{text}]"
+    elif isinstance(value, str | bool | None):
         text = json.dumps(value, ensure_ascii=False)
-    except (TypeError, ValueError):  # dates, or integers too long to print
-        text = f"a {type(value).__name__}"
-    text = {"NaN": "nan", "Infinity": "inf", "-Infinity": "-inf"}.get(text, text)
+    elif isinstance(value, float):
+        text = repr(value)
+    else:
+        try:
+            text = str(value)
+        except ValueError:  # an integer with more digits than Python prints
+            text = "a number of very many digits"
     return text if len(text) <= 60 else f"{text[:57]}…"
 
 
