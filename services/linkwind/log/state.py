@@ -114,7 +114,13 @@ class StepEncoder:
         errors = [math.nan] * (order + 1)
         self._layout = FixedLayout(
             MESSAGES["Step"](
-                step=0, time_ns=0, iteration=0, order=0, extrapolation_error=errors, residual=0.0
+                step=0,
+                time_ns=0,
+                iteration=0,
+                order=0,
+                extrapolation_error=errors,
+                residual=0.0,
+                interface_energy=0.0,
             )
         )
         self._views = self._layout.views
@@ -128,6 +134,7 @@ class StepEncoder:
         order: int,
         extrapolation_error: Sequence[float],
         residual: float,
+        interface_energy: float,
     ) -> bytes:
         """Return the Step of one exchange.
 
@@ -138,7 +145,8 @@ class StepEncoder:
             order: degree of the extrapolation that gave the trial state.
             extrapolation_error: E_0 … E_p by degree, at most as many as the largest order allows; degrees
                 that could not be estimated are NaN in the message.
-            residual: trial against accepted twist, weighted by mass.
+            residual: trial against accepted twist, weighted by mass [J^½].
+            interface_energy: step size times the power of the wrench on that difference [J].
         """
         views = self._views
         views["step"][0], views["time_ns"][0] = step, time_ns
@@ -147,6 +155,7 @@ class StepEncoder:
         errors[:] = math.nan
         errors[: len(extrapolation_error)] = extrapolation_error
         views["residual"][0] = residual
+        views["interface_energy"][0] = interface_energy
         return self._layout.payload()
 
 

@@ -1,0 +1,269 @@
+"""Reading a log, whole, cut or damaged.
+
+What can be read is read, and what is missing is said: :attr:`Log.damage`. Numbers come only from bytes
+whose checksum holds::
+
+    log = open_log("runs/two_link-1/log.mcap")
+    for message in log.decoded("/state"):
+        print(message.time_ns, message.message.joint_gap)
+"""
+
+from __future__ import annotations
+
+import json
+import mmap
+from collections.abc import Container, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from google.protobuf.message import DecodeError
+
+from linkwind.errors import LogError
+from linkwind.log import contents, tables
+from linkwind.log.chunks import MAGIC, ChannelInfo, Data, Message, chunk_records, messages_of
+from linkwind.log.scan import scan
+from linkwind.schema import MESSAGES
+
+
+class RawMessage(NamedTuple):
+    """A message as it was logged: topic, simulation time [ns], protobuf bytes."""
+
+    topic: str
+    time_ns: int
+    payload: bytes
+
+
+class DecodedMessage(NamedTuple):
+    """A message parsed: topic, simulation time [ns], protobuf message of ``linkwind.v1``."""
+
+    topic: str
+    time_ns: int
+    message: Any
+
+
+class Damage(NamedTuple):
+    """What is missing from a log.
+
+    Attributes:
+        bytes_lost: length of what cannot be read.
+        messages_lost: messages known to be missing; there were more where ``cut`` is set.
+        cut: the file ends without its summary, so that what came after its end is unknown.
+        text: where and why, for people.
+    """
+
+    bytes_lost: int
+    messages_lost: int
+    cut: bool
+    text: str
+
+
+class LogInfo(NamedTuple):
+    """What ``linkwind log info`` tells: name of the scenario, messages by topic, and their sum."""
+
+    messages: int
+    topics: dict[str, int]
+    steps: int
+    complete: bool
+    scenario: str
+    versions: dict[str, str]
+
+
+class Log:
+    """One log file, open for reading; made by :func:`open_log`.
+
+    Attributes:
+        path: of the file.
+        damage: what is missing, None for a file that is whole.
+        topics: number of readable messages by topic.
+        metadata: run id, schema hash and what the writer was given besides.
+        versions: of the programs that made the log, and the processor.
+    """
+
+    def __init__(self, path: Path, data: Data) -> None:
+        self.path = path
+        self._data = data
+        self._contents = scan(data)
+        self._check_origin()
+        self._channels: dict[int, ChannelInfo] = dict(self._contents.channels)
+        counts = self._counts()
+        self.topics = {self._channels[number].topic: counts[number] for number in sorted(counts)}
+        self._check_schemas()
+        self.metadata: dict[str, str] = self._contents.metadata.get(contents.RUN, {})
+        self.versions: dict[str, str] = self._contents.metadata.get(contents.VERSIONS, {})
+        self._end: dict[str, str] = self._contents.metadata.get(contents.END, {})
+
+    def _check_origin(self) -> None:
+        profile = self._contents.profile
+        if profile != contents.PROFILE and contents.RUN not in self._contents.metadata:
+            raise LogError(
+                f'{self.path}: header: expected profile "{contents.PROFILE}"; got "{profile}". '
+                "Another program wrote this MCAP file; give the log.mcap of a linkwind run."
+            )
+
+    def _check_schemas(self) -> None:
+        for topic, schema in self._channels.values():
+            name = contents.message_name(topic)
+            if name is not None and schema != contents.PACKAGE + name:
+                raise LogError(
+                    f'{self.path}: {topic}: expected schema {contents.PACKAGE}{name}; got "{schema}". '
+                    "Read this log with the version of linkwind that wrote it."
+                )
+
+    def _counts(self) -> dict[int, int]:
+        """Return the readable messages by channel, and find out the damage."""
+        gaps, written = self._contents.gaps, self._contents.counts
+        self.damage: Damage | None = None
+        if not gaps and written is not None:
+            return {number: count for number, count in written.items() if count}
+        counts: dict[int, int] = {}
+        last: dict[int, int] = {}  # sequence numbers of a channel count from 1
+        for channel, sequence, _, _ in self._messages():
+            counts[channel] = counts.get(channel, 0) + 1
+            last[channel] = sequence
+        known = {number: count for number, count in counts.items() if number in self._channels}
+        all_written = sum(last.values() if written is None else written.values())
+        self.damage = Damage(
+            sum(gap.size for gap in gaps),
+            all_written - sum(known.values()),
+            written is None,
+            "; ".join(f"byte {gap.offset}: {gap.reason} ({gap.size} bytes)" for gap in gaps),
+        )
+        return known
+
+    def _messages(self, wanted: Container[int] | None = None) -> Iterator[Message]:
+        for chunk in self._contents.chunks:
+            records = chunk_records(self._data, chunk, verified=self._contents.verified)
+            if records is not None:  # they were read before
+                yield from messages_of(records, self._channels, wanted)
+
+    @property
+    def run(self) -> str:
+        """Id of the run."""
+        return self._known(self.metadata.get("run"), "the run id")
+
+    @property
+    def scenario_json(self) -> str:
+        """The resolved scenario."""
+        scenario = self._contents.attachments.get(contents.SCENARIO)
+        return self._known(None if scenario is None else scenario.decode(), "the scenario")
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Bodies in the order of the messages."""
+        return tuple(json.loads(self._known(self.metadata.get("bodies"), "the list of bodies")))
+
+    @property
+    def provider_bodies(self) -> dict[str, tuple[str, ...]]:
+        """Bodies of each provider, in the order of its WrenchStep."""
+        providers = json.loads(self._known(self.metadata.get("provider_bodies"), "the list of providers"))
+        return {name: tuple(bodies) for name, bodies in providers.items()}
+
+    def _known(self, value: str | None, what: str) -> str:
+        if value is None:
+            text = self.damage.text if self.damage else "a log without it"
+            raise LogError(
+                f"{self.path}: expected {what} at the beginning; got {text}. Run the scenario again."
+            )
+        return value
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run came to its end and every message of it can be read."""
+        return self.damage is None and self._end.get("complete") == "true"
+
+    @property
+    def error(self) -> str | None:
+        """What ended the run early: class and text; None if nothing did or the writer was killed."""
+        return f"{self._end['error']}: {self._end['text']}" if "error" in self._end else None
+
+    @property
+    def final_state_sha256(self) -> str | None:
+        """Of the last accepted state; None for a run without an end."""
+        return self._end.get("final_state_sha256")
+
+    @property
+    def steps(self) -> int:
+        """Communication steps of the run; of a cut log, those that can be read."""
+        if "steps" in self._end:
+            return int(self._end["steps"])
+        payloads = [message.payload for message in self.raw(contents.STATE)]
+        if not payloads:
+            return 0
+        first, last = (MESSAGES["State"].FromString(payload).step for payload in (payloads[0], payloads[-1]))
+        return int(last - first)
+
+    @property
+    def info(self) -> LogInfo:
+        """What ``linkwind log info`` tells."""
+        scenario = json.loads(self.scenario_json)["name"]
+        topics = dict(self.topics)
+        return LogInfo(sum(topics.values()), topics, self.steps, self.complete, scenario, self.versions)
+
+    def raw(self, *topics: str) -> Iterator[RawMessage]:
+        """Iterate over the readable messages in the order of logging: of ``topics``, or all."""
+        names = {
+            number: channel.topic
+            for number, channel in self._channels.items()
+            if not topics or channel.topic in topics
+        }
+        for channel, _, time_ns, payload in self._messages(names):
+            yield RawMessage(names[channel], time_ns, payload)
+
+    def decoded(self, *topics: str) -> Iterator[DecodedMessage]:
+        """Iterate like :meth:`raw` over parsed messages of ``linkwind.v1``; pictures are left out.
+
+        Raises:
+            LogError: a message is not what its topic carries.
+        """
+        for topic, time_ns, payload in self.raw(*topics):
+            name = contents.message_name(topic)
+            if name is None:
+                continue
+            try:
+                yield DecodedMessage(topic, time_ns, MESSAGES[name].FromString(payload))
+            except DecodeError as error:
+                raise LogError(f"{self.path}: {topic}: expected a {name}; got {error}.") from error
+
+    def columns(self, topic: str) -> dict[str, Any]:
+        """Return the values of every field of a topic's messages, by dotted name, one row a message.
+
+        Raises:
+            LogError: the topic has no message, or messages of different sizes.
+        """
+        name = contents.message_name(topic)
+        if name is None:
+            raise LogError(f"{self.path}: expected a topic of linkwind; got {topic}.")
+        return tables.columns([m.payload for m in self.raw(topic)], name, f"{self.path}: {topic}")
+
+    def trajectory(self) -> tables.Trajectory:
+        """Return the accepted trajectory, stacked over the communication points."""
+        return tables.trajectory(self.columns(contents.STATE))
+
+    def steps_table(self) -> tables.Steps:
+        """Return what the coupling did, stacked over the exchanges."""
+        return tables.steps(self.columns(contents.STEP))
+
+    def timing(self) -> tables.Timing:
+        """Return the wall-clock times, stacked over the exchanges."""
+        return tables.timing(self.columns(contents.TIMING))
+
+
+def open_log(path: str | Path) -> Log:
+    """Open a log for reading, whole, cut or damaged.
+
+    Args:
+        path: the MCAP file.
+
+    Raises:
+        LogError: the file is missing, empty, not MCAP, or not a log of linkwind.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            start = file.read(len(MAGIC))
+            if start == MAGIC:
+                return Log(path, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
+    except OSError as error:
+        raise LogError(f"{path}: expected a log; got {error.strerror}. Check the path.") from error
+    got = f"a file that starts with {start!r}" if start else "an empty file"
+    raise LogError(f"{path}: expected an MCAP file; got {got}. Give the log.mcap of a linkwind run.")
