@@ -43,7 +43,7 @@ static double unary(int32_t operation, double x) {
     }
 }
 
-/* min and max let a NaN through (fmin and fmax would hide it). */
+/* min and max let a NaN through (fmin and fmax would hide it) and return the first of two equals. */
 static double binary(int32_t operation, double x, double y) {
     switch (operation) {
     case LW_ADD: return x + y;
@@ -53,8 +53,8 @@ static double binary(int32_t operation, double x, double y) {
     case LW_POWER: return pow(x, y);
     case LW_ATAN2: return atan2(x, y);
     case LW_HYPOT: return hypot(x, y);
-    case LW_MIN: return x < y || x != x ? x : y;
-    case LW_MAX: return x > y || x != x ? x : y;
+    case LW_MIN: return y < x || y != y ? y : x;
+    case LW_MAX: return y > x || y != y ? y : x;
     default: return NAN;
     }
 }

@@ -44,6 +44,8 @@ _BINARY: dict[type[ast.operator], Operation] = {
     ast.Pow: Operation.POWER,
 }
 
+_LINE = {ord(c): " " for c in "\r\n\t\f\v"}  # a text may be broken into lines
+
 RESERVED = frozenset((*VARIABLES, *CONSTANTS, *FUNCTIONS))
 
 
@@ -93,30 +95,30 @@ def _check_name(name: str, item: str) -> None:
 
 
 def _parse(text: str, item: str) -> ast.expr:
-    """Return the syntax tree of a text, whose line breaks count as blanks."""
-    if len(text) > MAX_LENGTH:
-        raise ExpressionError(
-            f"{item}: expected at most {MAX_LENGTH} characters; got {len(text)}. Split it into let = {{ … }}."
-        )
-    blank = text.translate({ord(c): " " for c in "\r\n\t\f"})
-    if "#" in blank or not blank.strip():
-        got = '"#", where Python would start a comment' if "#" in blank else "nothing"
-        column = blank.find("#") + 1 or 1
-        raise ExpressionError(f"{item}: column {column}: expected an expression; got {got}. Write one.")
+    """Return the syntax tree of a text that starts without blanks and has no line breaks."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # Python's hints on unusual source text
-            # In brackets a leading blank is no indentation; they shift the columns by one.
-            return ast.parse(f"({blank}\n)", mode="eval").body
+            return ast.parse(text, mode="eval").body
     except (SyntaxError, ValueError) as error:
-        offset = getattr(error, "offset", None) or 2
-        column = min(max(offset - 1, 1), len(text))
         raise ExpressionError(
-            f'{item}: column {column}: expected an expression; got "{_short(text)}" '
+            f'{item}: expected an expression; got "{_short(text)}" '
             f"({getattr(error, 'msg', error)}). Check brackets and operators."
         ) from None
     except (RecursionError, MemoryError):
         raise _too_deep(item) from None
+
+
+def _check_text(text: str, item: str) -> None:
+    if not text.strip():
+        raise ExpressionError(f"{item}: expected an expression; got nothing. Write 0 for no force.")
+    if "#" in text:
+        at = text.index("#") + 1
+        raise ExpressionError(f'{item}: column {at}: expected an expression; got "#". Put comments outside.')
+    if len(text) > MAX_LENGTH:
+        raise ExpressionError(
+            f"{item}: expected at most {MAX_LENGTH} characters; got {len(text)}. Split it into let = {{ … }}."
+        )
 
 
 def _too_deep(item: str) -> ExpressionError:
@@ -138,6 +140,7 @@ class _Compiler:
         self.constants: list[float] = []
         self.locals: dict[str, int] = {}
         self._text = self._item = ""
+        self._blanks = 0  # before the text, for columns
 
     def emit(self, operation: Operation, operand: int = 0) -> None:
         self.code.append((operation, operand))
@@ -152,8 +155,10 @@ class _Compiler:
 
     def compile(self, text: str, item: str) -> None:
         """Emit the code that leaves the value of ``text`` on the stack."""
-        self._text, self._item = text, item
-        needed = self._expression(_parse(text, item), 1)
+        _check_text(text, item)
+        self._text, self._item = text.lstrip().translate(_LINE), item
+        self._blanks = len(text) - len(self._text)
+        needed = self._expression(_parse(self._text, item), 1)
         if needed > STACK_SIZE:
             raise _too_deep(item)
 
@@ -255,8 +260,7 @@ class _Compiler:
         return needed
 
     def _source(self, node: ast.expr) -> str:
-        start, end = _column(self._text, node.col_offset), _column(self._text, node.end_col_offset or 0)
-        return f'"{_short(self._text[start - 1 : end - 1])}"'
+        return f'"{_short(ast.get_source_segment(self._text, node) or self._text)}"'
 
     def _unknown(
         self, node: ast.expr, what: str, known: Iterable[str], name: str, hint: str
@@ -266,13 +270,9 @@ class _Compiler:
         return self._error(node, f"{what} {', '.join(known)}", f'"{name}"', advice)
 
     def _error(self, node: ast.expr, expected: str, got: str, advice: str) -> ExpressionError:
-        column = _column(self._text, node.col_offset)
+        before = self._text.encode()[: node.col_offset].decode()  # offsets are in bytes
+        column = self._blanks + len(before) + 1
         return ExpressionError(f"{self._item}: column {column}: expected {expected}; got {got}. {advice}")
-
-
-def _column(text: str, offset: int) -> int:
-    """Return the column (from 1) of an offset in bytes of the bracketed text."""
-    return len(text.encode()[: max(offset - 1, 0)].decode(errors="ignore")) + 1
 
 
 def _integer_power(node: ast.BinOp) -> int | None:
