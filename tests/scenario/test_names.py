@@ -1,0 +1,37 @@
+"""The names that a scenario may use are the names of what exists."""
+
+from typing import get_args
+
+from linkwind.aero import MODELS
+from linkwind.coupling import SCHEMES
+from linkwind.native.forces import Coefficients
+from linkwind.native.multibody import JOINT_TYPES, Integrator
+from linkwind.scenario.bodies import JointType
+from linkwind.scenario.providers import AeroModel, FieldExpressions, PlateCoefficients
+from linkwind.scenario.settings import IntegratorName, Scheme
+
+
+def test_joint_types():
+    assert get_args(JointType) == tuple(JOINT_TYPES)
+
+
+def test_integrators():
+    assert get_args(IntegratorName) == tuple(integrator.name.lower() for integrator in Integrator)
+
+
+def test_aero_models():
+    assert get_args(AeroModel) == tuple(MODELS)
+
+
+def test_plate_coefficients():
+    assert get_args(PlateCoefficients) == tuple(each.name.lower() for each in Coefficients)
+
+
+def test_schemes():
+    assert get_args(Scheme) == tuple(SCHEMES)
+
+
+def test_field_components():
+    from linkwind.native.forces import COMPONENTS
+
+    assert tuple(FieldExpressions.model_fields) == ("let", *COMPONENTS)
