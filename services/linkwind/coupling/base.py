@@ -76,8 +76,8 @@ class CommunicationPoint(NamedTuple):
         wrench: at t_k, shape (n, 6): the last answer for it. A copy.
         added_inertia: that came with it, shape (n, 6, 6); None for none.
         order: degree of the extrapolation that led to the trial.
-        errors: extrapolation error by degree 0 … p, smoothed (E of `degree`), shape (p+1,), NaN in the
-            start-up; empty for a scheme that does not extrapolate. A copy.
+        errors: extrapolation error by degree 0 … p, smoothed (E of `degree`), NaN in the start-up; empty
+            for a scheme that does not extrapolate.
         iterations: exchanges made for this point.
     """
 
@@ -87,7 +87,7 @@ class CommunicationPoint(NamedTuple):
     wrench: Array
     added_inertia: Array | None
     order: int
-    errors: Array
+    errors: tuple[float, ...]
     iterations: int
 
 

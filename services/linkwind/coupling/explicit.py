@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from linkwind.coupling.base import CommunicationPoint, Exchange, Plant, Settings, State
 from linkwind.coupling.history import History
 
@@ -21,13 +19,10 @@ def run(
     """Drive the plant with held wrenches, one exchange a step. See `linkwind.coupling.base.Scheme`."""
     history = History(len(settings.weight), depth=1)
     nodes, wrenches = history.behind[1]
-    errors = np.empty(0)
     accepted = trial = initial
     for step in range(steps + 1):
         if step > 0:
             trial = plant.advance(accepted, nodes, wrenches, history.added_inertia)
         history.add(step, exchange(step, 0, accepted, trial))
         accepted = trial
-        yield CommunicationPoint(
-            step, accepted, trial, wrenches[0].copy(), history.added_inertia, 0, errors, 1
-        )
+        yield CommunicationPoint(step, accepted, trial, wrenches[0].copy(), history.added_inertia, 0, (), 1)
