@@ -7,20 +7,16 @@
 /* One macro step in progress. */
 typedef struct {
     lw_multibody *mb;
+    const lw_macro_step *step;
     lw_polynomial wrench;
-    const double *wrenches;
-    double h;            /* macro step [s] */
-    int32_t substeps;
-    double rtol, atol;
-    double proposed;     /* substep [s] that dopri5 would take next */
-    lw_fault *fault;
+    double proposed; /* substep [s] that dopri5 would take next */
 } lw_run;
 
 static int length(const lw_multibody *mb) { return mb->nq + mb->nv + 2; }
 
 static const double *wrench_at(lw_run *run, double s) {
-    if (run->wrench.count == 1) return run->wrenches;
-    lw_polynomial_value(&run->wrench, s, 6 * run->mb->n, run->wrenches, run->mb->wrench);
+    if (run->wrench.count == 1) return run->step->wrenches;
+    lw_polynomial_value(&run->wrench, s, 6 * run->mb->n, run->step->wrenches, run->mb->wrench);
     return run->mb->wrench;
 }
 
@@ -28,9 +24,9 @@ static const double *wrench_at(lw_run *run, double s) {
 static int derive(lw_run *run, double s, const double *y, double *rate) {
     lw_multibody *mb = run->mb;
     const double *wrench = wrench_at(run, s), *v = y + mb->nq;
-    int status = lw_accelerations(mb, y, v, wrench, rate + mb->nq, run->fault);
+    int status = lw_accelerations(mb, y, v, wrench, rate + mb->nq, run->step->fault);
     if (status) {
-        run->fault->time = s * run->h;
+        run->step->fault->time = s * run->step->h;
         return status;
     }
     lw_coordinate_rate(mb, y, v, rate);
@@ -52,8 +48,8 @@ static int settle(lw_run *run, double *y, double s) {
     for (int i = 0; i < mb->n; ++i) {
         const lw_link *l = &mb->link[i];
         if (!overflowed(y, l->q, lw_joint_nq(l->type)) && !overflowed(y, mb->nq + l->v, l->columns)) continue;
-        run->fault->item = l->body;
-        run->fault->time = s * run->h;
+        run->step->fault->item = l->body;
+        run->step->fault->time = s * run->step->h;
         return LW_NOT_FINITE;
     }
     return LW_OK;
@@ -122,8 +118,8 @@ static int stages(lw_run *run, const lw_tableau *t, int first, double s, double 
 
 static int runge_kutta(lw_run *run, const lw_tableau *t) {
     lw_multibody *mb = run->mb;
-    double h = run->h / run->substeps, width = 1.0 / run->substeps;
-    for (int32_t k = 0; k < run->substeps; ++k) {
+    double h = run->step->h / run->step->substeps, width = 1.0 / run->step->substeps;
+    for (int32_t k = 0; k < run->step->substeps; ++k) {
         int status = stages(run, t, 0, k * width, width, h);
         if (status) return status;
         combine(mb, t->stages, t->b, h, mb->y);
@@ -136,8 +132,8 @@ static int runge_kutta(lw_run *run, const lw_tableau *t) {
 
 static int semi_implicit_euler(lw_run *run) {
     lw_multibody *mb = run->mb;
-    double h = run->h / run->substeps, width = 1.0 / run->substeps;
-    for (int32_t k = 0; k < run->substeps; ++k) {
+    double h = run->step->h / run->step->substeps, width = 1.0 / run->step->substeps;
+    for (int32_t k = 0; k < run->step->substeps; ++k) {
         double *y = mb->y, *rate = mb->rate[0];
         int status = derive(run, k * width, y, rate);
         if (status) return status;
@@ -160,7 +156,7 @@ static double error_norm(const lw_run *run, double h) {
     for (int k = 0; k < size; ++k) {
         double error = 0.0, larger = fmax(fabs(mb->y[k]), fabs(mb->trial[k]));
         for (int j = 0; j < 7; ++j) error += dopri5_error[j] * mb->rate[j][k];
-        error *= h / (run->atol + run->rtol * larger);
+        error *= h / (run->step->atol + run->step->rtol * larger);
         sum += error * error;
     }
     return size ? sqrt(sum / size) : 0.0;
@@ -180,14 +176,14 @@ static int accept(lw_run *run, double time) {
     double *last = mb->rate[6];
     mb->rate[6] = mb->rate[0];
     mb->rate[0] = last;
-    int status = settle(run, mb->y, time / run->h);
+    int status = settle(run, mb->y, time / run->step->h);
     lw_coordinate_rate(mb, mb->y, mb->y + mb->nq, mb->rate[0]);
     return status;
 }
 
 static int dormand_prince(lw_run *run) {
     lw_multibody *mb = run->mb;
-    double time = 0.0, h = run->h, limit = run->h / run->substeps, largest = 5.0;
+    double time = 0.0, h = run->step->h, limit = run->step->h / run->step->substeps, largest = 5.0;
     double next = run->proposed > 0.0 ? fmin(run->proposed, limit) : limit;
     int status = derive(run, 0.0, mb->y, mb->rate[0]);
     if (run->proposed <= 0.0) run->proposed = next;
@@ -195,7 +191,7 @@ static int dormand_prince(lw_run *run) {
         int last = time + 1.01 * next >= h;
         double step = last ? h - time : next;
         if (step < 1e-13 * h) {
-            run->fault->time = time;
+            run->step->fault->time = time;
             return LW_STEP_UNDERFLOW;
         }
         status = stages(run, &dopri5, 1, time / h, step / h, step);
@@ -219,42 +215,38 @@ static int dormand_prince(lw_run *run) {
 
 /* ---- one macro step ---- */
 
-static int check_arguments(lw_run *run, int32_t count, const double *nodes) {
-    if (!(run->h > 0.0) || !isfinite(run->h)) return LW_BAD_STEP;
-    if (run->substeps < 1) return LW_BAD_SUBSTEPS;
-    if (lw_polynomial_init(&run->wrench, count, nodes)) return LW_BAD_NODES;
-    return LW_OK;
+static int check_arguments(lw_run *run) {
+    const lw_macro_step *step = run->step;
+    if (!(step->h > 0.0) || !isfinite(step->h)) return LW_BAD_STEP;
+    if (step->substeps < 1) return LW_BAD_SUBSTEPS;
+    if (!(step->rtol >= 0.0 && step->atol > 0.0)) return LW_BAD_TOLERANCE;
+    if (lw_polynomial_init(&run->wrench, step->count, step->nodes)) return LW_BAD_NODES;
+    return lw_inputs_check(run->mb, step->state, step->count, step->wrenches, step->added_inertia,
+                           step->fault);
 }
 
-static int integrate(lw_run *run, int32_t integrator) {
-    switch (integrator) {
+static int integrate(lw_run *run) {
+    switch (run->step->integrator) {
     case LW_EULER: return runge_kutta(run, &euler);
     case LW_SEMI_IMPLICIT_EULER: return semi_implicit_euler(run);
     case LW_RK4: return runge_kutta(run, &rk4);
-    case LW_DOPRI5:
-        if (!(run->rtol >= 0.0 && run->atol > 0.0)) return LW_BAD_TOLERANCE;
-        return dormand_prince(run);
+    case LW_DOPRI5: return dormand_prince(run);
     default: return LW_BAD_INTEGRATOR;
     }
 }
 
-int lw_multibody_advance(lw_multibody *mb, const double *state, double h, int32_t count,
-                         const double *nodes, const double *wrenches, const double *added_inertia,
-                         int32_t integrator, int32_t substeps, double rtol, double atol, double *next,
-                         double *work, lw_fault *fault) {
-    lw_run run = {.mb = mb, .wrenches = wrenches, .h = h, .substeps = substeps, .rtol = rtol, .atol = atol,
-                  .fault = fault};
-    size_t coordinates = (size_t)(mb->nq + mb->nv) * sizeof(double);
-    int status = check_arguments(&run, count, nodes);
-    if (!status) status = lw_inputs_check(mb, state, count, wrenches, added_inertia, fault);
+int lw_multibody_advance(lw_multibody *mb, const lw_macro_step *step) {
+    int coordinates = mb->nq + mb->nv;
+    lw_run run = {.mb = mb, .step = step};
+    int status = check_arguments(&run);
     if (status) return status;
-    run.proposed = state[mb->nq + mb->nv];
-    lw_bind_added(mb, added_inertia);
-    memcpy(mb->y, state, coordinates);
-    mb->y[mb->nq + mb->nv] = mb->y[mb->nq + mb->nv + 1] = 0.0;
-    if ((status = integrate(&run, integrator))) return status;
-    memcpy(next, mb->y, coordinates);
-    next[mb->nq + mb->nv] = run.proposed;
-    memcpy(work, mb->y + mb->nq + mb->nv, 2 * sizeof(double));
+    run.proposed = step->state[coordinates];
+    lw_bind_added(mb, step->added_inertia);
+    memcpy(mb->y, step->state, (size_t)coordinates * sizeof(double));
+    mb->y[coordinates] = mb->y[coordinates + 1] = 0.0;
+    if ((status = integrate(&run))) return status;
+    memcpy(step->next, mb->y, (size_t)coordinates * sizeof(double));
+    step->next[coordinates] = run.proposed;
+    memcpy(step->work, mb->y + coordinates, 2 * sizeof(double));
     return LW_OK;
 }

@@ -92,16 +92,24 @@ LW_API int lw_multibody_init(lw_multibody *memory, const lw_tables *tables, lw_f
 
 /* A state is nq + nv + 1 numbers: q, v, and the substep [s] that dopri5 would take next (0 = not known). */
 
-/* One macro step of h [s] from `state` to `next` (which may be the same memory).
- *
- * The wrench is the polynomial through `wrenches` (count, n, 6: force, torque in W at the COM) at `nodes`
- * in units of h from the start of the step. `added_inertia` (n, 6, 6: body frame at the COM, symmetric
- * positive semi-definite, force first) or NULL; the force -A a is added to the wrench. `work` receives the
- * work [J] of the whole wrench on the bodies and the energy that the joint dampers took. */
-LW_API int lw_multibody_advance(lw_multibody *multibody, const double *state, double h, int32_t count,
-                                const double *nodes, const double *wrenches, const double *added_inertia,
-                                int32_t integrator, int32_t substeps, double rtol, double atol,
-                                double *next, double *work, lw_fault *fault);
+/* One macro step. */
+typedef struct {
+    const double *state;         /* at its start */
+    double h;                    /* its length [s] */
+    const double *nodes;         /* (count) in units of h from its start */
+    const double *wrenches;      /* (count,n,6) force, torque in W at the COM: the wrench is the polynomial
+                                    through these values at the nodes */
+    const double *added_inertia; /* (n,6,6) body frame at the COM, symmetric positive semi-definite, force
+                                    first: the force -A a is added to the wrench; or NULL */
+    double rtol, atol;           /* of dopri5, on every coordinate and velocity */
+    int32_t count, integrator, substeps;
+    double *next;                /* out: state at its end; may be the memory of `state` */
+    double *work;                /* out (2): work of the whole wrench on the bodies, energy taken by the
+                                    joint dampers [J] */
+    lw_fault *fault;             /* out, if the status is not 0 */
+} lw_macro_step;
+
+LW_API int lw_multibody_advance(lw_multibody *multibody, const lw_macro_step *step);
 
 /* Poses and twists of the bodies: position (n,3), orientation (n,4), linear (n,3), angular (n,3), in W. */
 LW_API void lw_multibody_motion(lw_multibody *multibody, const double *state, double *position,
