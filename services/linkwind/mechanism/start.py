@@ -198,4 +198,4 @@ def _agree(item: str, stated: tuple[float, ...] | None, allowed: Array, carrier:
 
 
 def _vector(values: Array | tuple[float, ...]) -> str:
-    return "[" + ", ".join(f"{value + 0.0:.12g}" for value in values) + "]"
+    return "[" + ", ".join(f"{round(value, 12) + 0.0:.12g}" for value in values) + "]"

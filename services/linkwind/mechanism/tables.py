@@ -65,7 +65,7 @@ def _per_freedom(carrier: Carrier, key: str) -> Array:
     value = getattr(carrier.joint, key) if carrier.joint else 0.0
     numbers = value if isinstance(value, tuple) else (value,) * count
     if len(numbers) != count or (value and not count):
-        _refuse(carrier, key, f"one number, or {count}", value)
+        _refuse(carrier, key, f"one number, or a list of {count}," if count else "nothing", value)
     return np.array(numbers, dtype=np.float64)
 
 
