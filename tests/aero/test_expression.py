@@ -8,7 +8,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from linkwind.aero.expression import CONSTANTS, FUNCTIONS, MAX_LENGTH, compile_program
+from linkwind.aero.expression import CONSTANTS, FUNCTIONS, compile_program
+from linkwind.aero.syntax import MAX_LENGTH
 from linkwind.errors import ExpressionError
 from linkwind.native.forces import LOCALS_SIZE, STACK_SIZE, Field, FieldTable, Operation
 from linkwind.spatial import Motion, Wrench

@@ -1,7 +1,6 @@
 """Expressions of a force field → a postfix program for the stack machine of ``fmu/aero/lw_field.h``.
 
-The text is parsed by Python's own parser and never evaluated; whatever is not on the lists below is
-refused, with its column.
+Whatever is not on the lists below is refused, with its column.
 """
 
 from __future__ import annotations
@@ -9,10 +8,10 @@ from __future__ import annotations
 import ast
 import difflib
 import math
-import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from linkwind.aero.syntax import MAX_NESTING, Source
 from linkwind.errors import ExpressionError
 from linkwind.native.forces import (
     COMPONENTS,
@@ -22,9 +21,6 @@ from linkwind.native.forces import (
     VARIABLES,
     Operation,
 )
-
-MAX_LENGTH = 10_000
-MAX_NESTING = 100
 
 CONSTANTS = {"pi": math.pi}
 _UNARY = "sin cos tan asin acos atan sinh cosh tanh exp log sqrt abs"
@@ -43,8 +39,6 @@ _BINARY: dict[type[ast.operator], Operation] = {
     ast.Div: Operation.DIVIDE,
     ast.Pow: Operation.POWER,
 }
-
-_LINE = {ord(c): " " for c in "\r\n\t\f\v"}  # a text may be broken into lines
 
 RESERVED = frozenset((*VARIABLES, *CONSTANTS, *FUNCTIONS))
 
@@ -94,44 +88,6 @@ def _check_name(name: str, item: str) -> None:
         )
 
 
-def _parse(text: str, item: str) -> ast.expr:
-    """Return the syntax tree of a text that starts without blanks and has no line breaks."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # Python's hints on unusual source text
-            return ast.parse(text, mode="eval").body
-    except (SyntaxError, ValueError) as error:
-        raise ExpressionError(
-            f'{item}: expected an expression; got "{_short(text)}" '
-            f"({getattr(error, 'msg', error)}). Check brackets and operators."
-        ) from None
-    except (RecursionError, MemoryError):
-        raise _too_deep(item) from None
-
-
-def _check_text(text: str, item: str) -> None:
-    if not text.strip():
-        raise ExpressionError(f"{item}: expected an expression; got nothing. Write 0 for no force.")
-    if "#" in text:
-        at = text.index("#") + 1
-        raise ExpressionError(f'{item}: column {at}: expected an expression; got "#". Put comments outside.')
-    if len(text) > MAX_LENGTH:
-        raise ExpressionError(
-            f"{item}: expected at most {MAX_LENGTH} characters; got {len(text)}. Split it into let = {{ … }}."
-        )
-
-
-def _too_deep(item: str) -> ExpressionError:
-    return ExpressionError(
-        f"{item}: expected at most {MAX_NESTING} nested levels; got more. Name parts of it in let = {{ … }}."
-    )
-
-
-def _short(text: str) -> str:
-    line = " ".join(text.split())
-    return line if len(line) <= 40 else f"{line[:39]}…"
-
-
 class _Compiler:
     """Emits postfix code for syntax trees, and watches the machine's limits."""
 
@@ -139,8 +95,7 @@ class _Compiler:
         self.code: list[tuple[Operation, int]] = []
         self.constants: list[float] = []
         self.locals: dict[str, int] = {}
-        self._text = self._item = ""
-        self._blanks = 0  # before the text, for columns
+        self._source = Source("0", "")
 
     def emit(self, operation: Operation, operand: int = 0) -> None:
         self.code.append((operation, operand))
@@ -155,17 +110,15 @@ class _Compiler:
 
     def compile(self, text: str, item: str) -> None:
         """Emit the code that leaves the value of ``text`` on the stack."""
-        _check_text(text, item)
-        self._text, self._item = text.lstrip().translate(_LINE), item
-        self._blanks = len(text) - len(self._text)
-        needed = self._expression(_parse(self._text, item), 1)
+        self._source = Source(text, item)
+        needed = self._expression(self._source.tree(), 1)
         if needed > STACK_SIZE:
-            raise _too_deep(item)
+            raise self._source.too_deep()
 
     def _expression(self, node: ast.expr, level: int) -> int:
         """Emit one node; return the number of places that it takes on the stack."""
         if level > MAX_NESTING:
-            raise _too_deep(self._item)
+            raise self._source.too_deep()
         match node:
             case ast.Constant():
                 return self._number(node)
@@ -182,18 +135,20 @@ class _Compiler:
             case ast.Call():
                 return self._call(node, level)
         expected = "numbers, names, + - * / **, brackets and functions"
-        raise self._error(node, expected, self._source(node), "Nothing else is allowed.")
+        raise self._source.error(node, expected, self._source.quote(node), "Nothing else is allowed.")
 
     def _number(self, node: ast.Constant) -> int:
         value = node.value
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self._error(node, "a number", self._source(node), "Write it like 1.5e-3.")
+            raise self._source.error(node, "a number", self._source.quote(node), "Write it like 1.5e-3.")
         try:
             number = float(value)
         except OverflowError:
             number = math.inf
         if math.isinf(number):
-            raise self._error(node, "a number below 1.8e308", self._source(node), "Write a smaller one.")
+            raise self._source.error(
+                node, "a number below 1.8e308", self._source.quote(node), "Write a smaller one."
+            )
         return self._constant(number)
 
     def _constant(self, number: float) -> int:
@@ -211,7 +166,7 @@ class _Compiler:
         elif name in CONSTANTS:
             self._constant(CONSTANTS[name])
         elif name in FUNCTIONS:
-            raise self._error(node, f"{name}(…)", f'"{name}"', "Give the function its argument.")
+            raise self._source.error(node, f"{name}(…)", f'"{name}"', "Give the function its argument.")
         else:
             known = (*VARIABLES, *CONSTANTS, *self.locals)
             hint = "Define it in let before it is used."
@@ -238,12 +193,16 @@ class _Compiler:
 
     def _operator(self, node: ast.BinOp) -> ExpressionError:
         if isinstance(node.op, ast.BitXor):
-            return self._error(node, "** for a power", f"^ in {self._source(node)}", "Use **.")
-        return self._error(node, "one of + - * / **", self._source(node), "Use one of these operators.")
+            return self._source.error(node, "** for a power", f"^ in {self._source.quote(node)}", "Use **.")
+        return self._source.error(
+            node, "one of + - * / **", self._source.quote(node), "Use one of these operators."
+        )
 
     def _call(self, node: ast.Call, level: int) -> int:
         if not isinstance(node.func, ast.Name) or node.func.id not in FUNCTIONS:
-            name = node.func.id if isinstance(node.func, ast.Name) else self._source(node.func).strip('"')
+            name = (
+                node.func.id if isinstance(node.func, ast.Name) else self._source.quote(node.func).strip('"')
+            )
             raise self._unknown(node, "a function, one of", FUNCTIONS, name, "Only these can be called.")
         name = node.func.id
         operation, least, most = FUNCTIONS[name]
@@ -251,7 +210,7 @@ class _Compiler:
         if node.keywords or not least <= given <= most:
             count = f"{least}" if least == most else f"{least} or more"
             got = "named ones" if node.keywords else str(given)
-            raise self._error(node, f"{count} arguments of {name}", got, "Separate them by commas.")
+            raise self._source.error(node, f"{count} arguments of {name}", got, "Separate them by commas.")
         needed = 0
         for place, argument in enumerate(node.args):
             needed = max(needed, min(place, 1) + self._expression(argument, level + 1))
@@ -259,20 +218,12 @@ class _Compiler:
                 self.emit(operation)
         return needed
 
-    def _source(self, node: ast.expr) -> str:
-        return f'"{_short(ast.get_source_segment(self._text, node) or self._text)}"'
-
     def _unknown(
         self, node: ast.expr, what: str, known: Iterable[str], name: str, hint: str
     ) -> ExpressionError:
         near = difflib.get_close_matches(name.lower(), known := tuple(known), n=1)
         advice = f'Did you mean "{near[0]}"?' if near else hint
-        return self._error(node, f"{what} {', '.join(known)}", f'"{name}"', advice)
-
-    def _error(self, node: ast.expr, expected: str, got: str, advice: str) -> ExpressionError:
-        before = self._text.encode()[: node.col_offset].decode()  # offsets are in bytes
-        column = self._blanks + len(before) + 1
-        return ExpressionError(f"{self._item}: column {column}: expected {expected}; got {got}. {advice}")
+        return self._source.error(node, f"{what} {', '.join(known)}", f'"{name}"', advice)
 
 
 def _integer_power(node: ast.BinOp) -> int | None:

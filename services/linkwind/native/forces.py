@@ -27,38 +27,13 @@ VARIABLES = ("t", "x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz", "theta")
 COMPONENTS = ("fx", "fy", "fz", "tx", "ty", "tz")
 
 
-class Operation(enum.IntEnum):
-    """Instructions of the stack machine (``fmu/aero/lw_field.h``)."""
-
-    CONSTANT = 0
-    VARIABLE = 1
-    LOCAL = 2
-    DEFINE = 3
-    RESULT = 4
-    NEGATE = 5
-    ADD = 6
-    SUBTRACT = 7
-    MULTIPLY = 8
-    DIVIDE = 9
-    POWER = 10
-    POWER_INTEGER = 11
-    SIN = 12
-    COS = 13
-    TAN = 14
-    ASIN = 15
-    ACOS = 16
-    ATAN = 17
-    SINH = 18
-    COSH = 19
-    TANH = 20
-    EXP = 21
-    LOG = 22
-    SQRT = 23
-    ABS = 24
-    ATAN2 = 25
-    HYPOT = 26
-    MIN = 27
-    MAX = 28
+# Instructions of the stack machine (fmu/aero/lw_field.h), numbered in its order.
+Operation = enum.IntEnum(
+    "Operation",
+    "CONSTANT VARIABLE LOCAL DEFINE RESULT NEGATE ADD SUBTRACT MULTIPLY DIVIDE POWER POWER_INTEGER "
+    "SIN COS TAN ASIN ACOS ATAN SINH COSH TANH EXP LOG SQRT ABS ATAN2 HYPOT MIN MAX",
+    start=0,
+)
 
 
 class Coefficients(enum.IntEnum):
