@@ -81,15 +81,16 @@ class Chromium:
         self.send("Page.navigate", url=path.as_uri())
         self.until("document.readyState === 'complete' && !!document.getElementById('time')?.value")
 
-    def mouse(self, kind, x, y, buttons=0):
+    def mouse(self, kind, x, y, buttons=0, count=1):
         button = "left" if kind != "mouseMoved" else "none"
-        event = {"type": kind, "x": x, "y": y, "button": button, "buttons": buttons, "clickCount": 1}
+        event = {"type": kind, "x": x, "y": y, "button": button, "buttons": buttons, "clickCount": count}
         self.send("Input.dispatchMouseEvent", **event)
 
-    def click(self, x, y):
+    def click(self, x, y, times=1):
         self.mouse("mouseMoved", x, y)
-        self.mouse("mousePressed", x, y, 1)
-        self.mouse("mouseReleased", x, y)
+        for count in range(1, times + 1):
+            self.mouse("mousePressed", x, y, 1, count)
+            self.mouse("mouseReleased", x, y, 0, count)
 
     def key(self, key, text=""):
         self.send("Input.dispatchKeyEvent", type="keyDown", key=key, text=text)

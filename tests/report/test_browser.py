@@ -1,0 +1,201 @@
+"""The page in a real browser: it plays, pauses, scrubs, zooms, and asks the network for nothing."""
+
+import dataclasses
+import sys
+
+import numpy as np
+import pytest
+
+from linkwind.report.page import render
+
+from .chromium import PROGRAM, Chromium
+from .synthetic import flapper, planar
+
+pytestmark = pytest.mark.skipif(
+    PROGRAM is None or sys.platform == "win32", reason="needs chromium: apt-get install chromium"
+)
+
+T = "Number(document.getElementById('time').value.replace(' s', ''))"
+LABEL = "document.getElementById('play').getAttribute('aria-label')"
+CURSORS = "[...document.querySelectorAll('.cursor')].map(c => new DOMMatrix(getComputedStyle(c).transform).e)"
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pages")
+    runs = {"planar": planar(400), "flapper": flapper(200), "single": planar(0, name="single")}
+    linear = runs["planar"].trajectory.linear.copy()
+    linear[50:] = np.nan
+    diverged = runs["planar"].trajectory._replace(
+        linear=linear, position=linear, wrench=np.dstack([linear] * 2)
+    )
+    runs["diverged"] = dataclasses.replace(
+        planar(400, name="diverged"), trajectory=diverged, complete=False, error="NaN"
+    )
+    for name, run in runs.items():
+        (folder / f"{name}.html").write_text(render(run), encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    chromium = Chromium(tmp_path_factory.mktemp("profile"))
+    size = {"width": 1400, "height": 1000, "deviceScaleFactor": 1, "mobile": False}
+    chromium.send("Emulation.setDeviceMetricsOverride", **size)
+    yield chromium
+    chromium.close()
+
+
+@pytest.fixture
+def page(browser, pages):
+    """The planar run at its start, paused; loaded once for all tests, because loading is what takes time."""
+    if browser.evaluate("document.title") != "two_link_gust · linkwind":
+        browser.open(pages / "planar.html")
+    browser.evaluate("document.activeElement.blur()")
+    browser.key("Home")
+    assert browser.evaluate(T) == 0.0
+    return browser
+
+
+def scrub(browser, frame):
+    browser.evaluate(f"scrub.value = {frame}; scrub.dispatchEvent(new Event('input'))")
+
+
+def picture(browser):
+    return browser.evaluate("document.getElementById('scene').toDataURL()")
+
+
+def plot_box(browser, index=0):
+    box = f"document.querySelectorAll('.plot')[{index}].getBoundingClientRect()"
+    return browser.evaluate(f"(b => [b.left, b.top, b.width, b.height])({box})")
+
+
+def test_the_time_moves_every_view(page):
+    before, cursors = picture(page), page.evaluate(CURSORS)
+    readouts = page.evaluate("document.querySelector('.readout').textContent")
+    scrub(page, 200)
+    assert page.evaluate(T) == 0.2
+    assert picture(page) != before
+    after = page.evaluate(CURSORS)
+    assert len(after) == len(cursors) > 8
+    assert all(now > then + 50 for now, then in zip(after, cursors, strict=True))
+    assert page.evaluate("document.querySelector('.readout').textContent") != readouts
+
+
+def test_the_cursor_stands_where_the_plot_has_the_time(page):
+    scrub(page, 300)
+    gap = page.evaluate(
+        """(() => {
+          const plot = document.querySelector('.plot'), axis = plot._fullLayout.xaxis;
+          const cursor = document.querySelector('.cursor').getBoundingClientRect().left;
+          return cursor - plot.getBoundingClientRect().left - axis._offset - axis.l2p(0.3);
+        })()"""
+    )
+    assert abs(gap) < 1.5
+
+
+def test_the_readout_is_the_value_at_the_cursor(page):
+    scrub(page, 123)
+    shown = page.evaluate("document.querySelector('.readout b').textContent").replace("−", "-")
+    assert float(shown) == pytest.approx(planar(400).trajectory.linear[123, 0, 0], abs=0.006)
+
+
+def test_play_pause_and_the_end(page):
+    page.key(" ", " ")
+    page.until(f"{T} > 0.02")
+    assert page.evaluate(LABEL) == "Pause"
+    page.key(" ", " ")
+    assert page.evaluate(LABEL) == "Play"
+    stopped = page.evaluate(T)
+    page.until("true")
+    page.until("true")
+    assert page.evaluate(T) == stopped
+    page.evaluate(
+        "(s => { s.value = '1'; s.dispatchEvent(new Event('change')); })(document.getElementById('speed'))"
+    )
+    page.evaluate("document.getElementById('play').click()")
+    page.until(f"{T} === 0.4 && {LABEL} === 'Play'")
+
+
+def test_keys_step_frame_by_frame(page):
+    scrub(page, 10)
+    for key, t in (("ArrowRight", 0.011), ("ArrowLeft", 0.01), ("End", 0.4), ("Home", 0.0)):
+        page.key(key)
+        assert page.evaluate(T) == t, key
+
+
+def test_a_click_and_a_hover_on_a_plot_set_the_time(page):
+    left, top, width, height = plot_box(page)
+    inner = width - 62 - 10
+    page.click(left + 62 + inner / 2, top + height / 2)
+    assert page.until(f"{T} > 0.1 && {T}") == pytest.approx(0.2, abs=0.002)
+    page.mouse("mouseMoved", left + 62 + inner / 4, top + height / 2)
+    assert page.until(f"{T} < 0.15 && {T}") == pytest.approx(0.1, abs=0.002)
+
+
+def test_a_zoom_is_shared_by_all_plots(page):
+    left, top, width, height = plot_box(page)
+    inner, y = width - 62 - 10, top + height / 2
+    page.mouse("mouseMoved", left + 62 + inner / 4, y)
+    page.mouse("mousePressed", left + 62 + inner / 4, y, 1)
+    for part in (0.4, 0.6, 0.75):
+        page.mouse("mouseMoved", left + 62 + inner * part, y, 1)
+    page.mouse("mouseReleased", left + 62 + inner * 0.75, y)
+    timed = "[...document.querySelectorAll('.plot')].filter(plot => plot.querySelector('.cursor'))"
+    ranges = f"{timed}.map(plot => plot.layout.xaxis.range)"
+    page.until(f"{ranges}.every(r => r[0] > 0.05)")
+    for low, high in page.evaluate(ranges):
+        assert (low, high) == pytest.approx((0.1, 0.3), abs=0.01)
+    page.click(left + width / 2, y, times=2)
+    page.until(f"{ranges}.every(r => r[0] === 0 && r[1] === 0.4)")
+
+
+def test_the_camera_follows_on_demand(page):
+    scrub(page, 200)
+    fitted = picture(page)
+    page.evaluate("document.getElementById('follow').click()")
+    assert picture(page) != fitted
+
+
+def test_a_scene_in_three_dimensions_turns_with_a_drag(browser, pages):
+    browser.open(pages / "flapper.html")
+    before = picture(browser)
+    browser.mouse("mouseMoved", 250, 450)
+    browser.mouse("mousePressed", 250, 450, 1)
+    browser.mouse("mouseMoved", 330, 480, 1)
+    browser.mouse("mouseReleased", 330, 480)
+    assert picture(browser) != before
+
+
+def test_the_page_follows_the_colour_scheme(page):
+    for scheme in ("dark", "light"):
+        features = [{"name": "prefers-color-scheme", "value": scheme}]
+        page.send("Emulation.setEmulatedMedia", features=features)
+        ink = page.evaluate("getComputedStyle(document.documentElement).getPropertyValue('--soft').trim()")
+        page.until(f"document.querySelector('.plot').layout.font.color === '{ink}'")
+
+
+def test_a_phone_needs_no_sideways_scrolling(page):
+    size = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
+    page.send("Emulation.setDeviceMetricsOverride", **size)
+    try:
+        page.until("document.querySelector('.plot').clientWidth < 380")
+        assert page.evaluate("document.documentElement.scrollWidth") == 390
+    finally:
+        size |= {"width": 1400, "height": 1000, "mobile": False}
+        page.send("Emulation.setDeviceMetricsOverride", **size)
+
+
+@pytest.mark.parametrize("name", ["planar", "flapper", "single", "diverged"])
+def test_nothing_fails_and_nothing_is_fetched(browser, pages, name):
+    browser.open(pages / f"{name}.html")
+    browser.key("End")
+    browser.until("true")
+    methods = [event["method"] for event in browser.events]
+    trouble = [e for e in browser.events if e["method"] in ("Runtime.exceptionThrown", "Log.entryAdded")]
+    assert trouble == []
+    assert "Network.requestWillBeSent" in methods
+    asked = [
+        e["params"]["request"]["url"] for e in browser.events if e["method"] == "Network.requestWillBeSent"
+    ]
+    assert [url for url in asked if not url.startswith("data:")] == [(pages / f"{name}.html").as_uri()]
