@@ -70,7 +70,8 @@ WRONG = [
      f"Use for example [1, 0, 0], or give {SIX}"),
     # springs and dampers
     (pair("revolute", stiffness=[1, 2]),
-     "joints[0].stiffness: expected one number, or a list of 1, for a revolute joint; got [1.0, 2.0]. Correct it."),
+     "joints[0].stiffness: expected one number, or a list of 1, for a revolute joint; "
+     "got [1.0, 2.0]. Correct it."),
     (pair("fixed", damping=2),
      "joints[0].damping: expected nothing for a fixed joint; got 2.0. Correct it."),
     (pair("planar", rest=1),
@@ -85,7 +86,7 @@ WRONG = [
 def test_a_wrong_mechanism_gets_its_line(scenario, line):
     with pytest.raises(MechanismError) as error:
         build(scenario)
-    assert str(error.value) == f"case: {line}"
+    assert str(error.value) == f"case.toml: {line}"
 
 
 def test_springs_and_dampers():

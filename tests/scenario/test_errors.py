@@ -261,7 +261,7 @@ KEYS = [
 ]  # fmt: skip
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(key=st.sampled_from(KEYS), junk=JUNK)
 def test_no_foreign_exception_leaks(key, junk):
     text = json.dumps(_with(json.loads(load("two_link").to_json()), key, junk))

@@ -1,14 +1,16 @@
 """The names that a scenario may use are the names of what exists."""
 
+import pkgutil
 from typing import get_args
 
+from linkwind import bus
 from linkwind.aero import MODELS
 from linkwind.coupling import SCHEMES
-from linkwind.native.forces import Coefficients
+from linkwind.native.forces import COMPONENTS, Coefficients
 from linkwind.native.multibody import JOINT_TYPES, Integrator
 from linkwind.scenario.bodies import JointType
 from linkwind.scenario.providers import AeroModel, FieldExpressions, PlateCoefficients
-from linkwind.scenario.settings import IntegratorName, Scheme
+from linkwind.scenario.settings import IntegratorName, Scheme, Transport
 
 
 def test_joint_types():
@@ -31,7 +33,9 @@ def test_schemes():
     assert get_args(Scheme) == tuple(SCHEMES)
 
 
-def test_field_components():
-    from linkwind.native.forces import COMPONENTS
+def test_transports():
+    assert {*get_args(Transport), "base"} == {module.name for module in pkgutil.iter_modules(bus.__path__)}
 
+
+def test_field_components():
     assert tuple(FieldExpressions.model_fields) == ("let", *COMPONENTS)

@@ -76,7 +76,7 @@ def scenarios(draw):
     }, (step_ns, steps)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(scenarios())
 def test_any_scenario_survives_json(drawn):
     data, (step_ns, steps) = drawn
