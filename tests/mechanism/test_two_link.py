@@ -118,9 +118,9 @@ def test_an_orientation_about_z_gives_a_planar_angle():
 def test_an_axis_against_z_turns_the_other_way():
     mechanism = build(load("two_link", ["joints.hinge.axis=[0, 0, -1]", "bodies.1.angular_velocity=2"]))
     assert mechanism.q0[3] == math.radians(200) - math.radians(-20)
-    assert mechanism.v0[3] == -2.0
+    assert mechanism.v0[3] == pytest.approx(-2.0, abs=1e-15)
     motion = motion_of(mechanism)
     half = math.radians(-20) / 2
     turned = abs(motion.orientation[1] @ [math.cos(half), 0, 0, math.sin(half)])
     assert turned == pytest.approx(1.0, abs=1e-15)
-    np.testing.assert_allclose(motion.angular[1], [0, 0, 2], atol=1e-15)
+    np.testing.assert_allclose(motion.angular[1], [0, 0, 2], atol=1e-14)
