@@ -206,7 +206,9 @@ class ProviderSession:
         if at <= self.at:
             if at == self.at:
                 return self._answer
-            _log.warning('"%s": dropped a stale motion message (step %d after %d)', self.name, at[0], self.at[0])
+            _log.warning(
+                '"%s": dropped a stale motion message (step %d after %d)', self.name, at[0], self.at[0]
+            )
             return None
         self._advance(*at)
         self._model.evaluate(motion.time_ns / 1e9, motion.trial, self._wrench.wrench)
@@ -241,7 +243,8 @@ class ProviderSession:
 
     def fault(self, error: BaseException) -> bytes:
         """Return the message that tells the others that this provider cannot go on."""
-        return fault(self.name, max(self.at[0], 0), self.at[1], error)
+        step, iteration = (self._motion.step, self._motion.iteration) if self.run else (0, 0)
+        return fault(self.name, step, iteration, error)
 
 
 def check_finite(wrench: Wrench, provider: str, bodies: Sequence[str], step: int, time_ns: int) -> None:
@@ -317,7 +320,9 @@ class DynamicsSession:
         index = {name: i for i, name in enumerate(bodies)}
         self._participants = {
             name: _Participant(
-                name, tuple(index[b] for b in on), bodies_index=_body_index([index[b] for b in on], len(bodies))
+                name,
+                tuple(index[b] for b in on),
+                bodies_index=_body_index([index[b] for b in on], len(bodies)),
             )
             for name, on in providers.items()
         }
@@ -498,4 +503,3 @@ def _body_index(on: list[int], n: int) -> Any:
     if on == list(range(n)):
         return slice(None)
     return np.array(on)
-

@@ -10,8 +10,7 @@ import pytest
 from linkwind.errors import FaultError, ProtocolError, RefusedError, SimulationError
 from linkwind.protocol import DynamicsSession, ProviderSession, ProviderState, fault_error
 from linkwind.schema import MESSAGES, SHA256
-
-from ..fakes import FakeModel
+from tests.fakes import FakeModel
 
 Control = MESSAGES["Control"]
 STEP_NS = 1_000_000
@@ -63,7 +62,9 @@ def test_hand_shake_names_bodies_and_steps() -> None:
     assert p.state is ProviderState.RUNNING
 
 
-def test_step_zero_commits_nothing_and_gives_the_first_wrench(pair: tuple[DynamicsSession, ProviderSession, FakeModel]) -> None:
+def test_step_zero_commits_nothing_and_gives_the_first_wrench(
+    pair: tuple[DynamicsSession, ProviderSession, FakeModel],
+) -> None:
     d, p, model = pair
     d.motion.trial.linear[:] = [[1, 2, 3], [4, 5, 6]]
     exchange(d, p, 0)
@@ -86,7 +87,9 @@ def test_order_of_exchange(pair: tuple[DynamicsSession, ProviderSession, FakeMod
     ]
 
 
-def test_iteration_goes_back_to_the_committed_state(pair: tuple[DynamicsSession, ProviderSession, FakeModel]) -> None:
+def test_iteration_goes_back_to_the_committed_state(
+    pair: tuple[DynamicsSession, ProviderSession, FakeModel],
+) -> None:
     d, p, model = pair
     exchange(d, p, 0)
     exchange(d, p, 1)
@@ -104,7 +107,9 @@ def test_iteration_without_rollback_is_refused() -> None:
         p.answer(d.post(1, 1))
 
 
-def test_repeated_motion_is_answered_from_memory(pair: tuple[DynamicsSession, ProviderSession, FakeModel]) -> None:
+def test_repeated_motion_is_answered_from_memory(
+    pair: tuple[DynamicsSession, ProviderSession, FakeModel],
+) -> None:
     d, p, model = pair
     first = exchange(d, p, 0)
     calls = list(model.calls)
@@ -127,14 +132,18 @@ def test_stale_motion_is_dropped_and_leaves_no_trace(
 
 
 @pytest.mark.parametrize(("step", "iteration"), [(2, 0), (1, 1), (5, 0)])
-def test_gap_is_an_error(pair: tuple[DynamicsSession, ProviderSession, FakeModel], step: int, iteration: int) -> None:
+def test_gap_is_an_error(
+    pair: tuple[DynamicsSession, ProviderSession, FakeModel], step: int, iteration: int
+) -> None:
     d, p, _ = pair
     exchange(d, p, 0)
     with pytest.raises(ProtocolError, match=f"expected step 1 iteration 0; got step {step}"):
         p.answer(d.post(step, iteration))
 
 
-def test_end_commits_the_last_state_and_says_bye(pair: tuple[DynamicsSession, ProviderSession, FakeModel]) -> None:
+def test_end_commits_the_last_state_and_says_bye(
+    pair: tuple[DynamicsSession, ProviderSession, FakeModel],
+) -> None:
     d, p, model = pair
     exchange(d, p, 0)
     assert p.answer(d.post(10, 0, final=True)) is None
@@ -206,7 +215,9 @@ def test_wrench_that_is_not_finite_names_provider_body_and_step(bad: float, wher
     shake_hands(d, p)
     exchange(d, p, 0)
     model.poison = (where, 1, bad)
-    with pytest.raises(SimulationError, match=rf'"aero": step 1 \(t = 0.001 s\): {where} on b: expected finite'):
+    with pytest.raises(
+        SimulationError, match=rf'"aero": step 1 \(t = 0.001 s\): {where} on b: expected finite'
+    ):
         p.answer(d.post(1, 0))
 
 
@@ -215,7 +226,14 @@ def test_dynamics_checks_numbers_itself(pair: tuple[DynamicsSession, ProviderSes
     exchange(d, p, 0)
     d.post(1, 0)
     message = MESSAGES["WrenchStep"](
-        run="r1", provider="aero", step=1, iteration=0, time_ns=STEP_NS, kind=1, force=[np.nan] * 6, torque=[0.0] * 6
+        run="r1",
+        provider="aero",
+        step=1,
+        iteration=0,
+        time_ns=STEP_NS,
+        kind=1,
+        force=[np.nan] * 6,
+        torque=[0.0] * 6,
     )
     with pytest.raises(SimulationError, match="force on a"):
         d.accept("aero", message.SerializeToString())
@@ -278,7 +296,10 @@ def test_wrench_of_another_run_provider_or_size_is_an_error(
 
 def test_answers_of_several_providers_add_up_in_scenario_order() -> None:
     d = DynamicsSession("r1", "{}", STEP_NS, 10, ["a", "b", "c"], {"one": ["c", "a"], "two": ["b", "c"]})
-    one, two = provider(FakeModel(value=1.0, added_inertia=True), "one"), provider(FakeModel(value=10.0), "two")
+    one, two = (
+        provider(FakeModel(value=1.0, added_inertia=True), "one"),
+        provider(FakeModel(value=10.0), "two"),
+    )
     shake_hands(d, one)
     shake_hands(d, two)
     motion = d.post(0, 0)
@@ -292,7 +313,9 @@ def test_answers_of_several_providers_add_up_in_scenario_order() -> None:
     assert added[:, 0, 0].tolist() == [1.0, 0.0, 1.0]
 
 
-def test_fault_names_participant_step_and_cause(pair: tuple[DynamicsSession, ProviderSession, FakeModel]) -> None:
+def test_fault_names_participant_step_and_cause(
+    pair: tuple[DynamicsSession, ProviderSession, FakeModel],
+) -> None:
     d, p, _ = pair
     exchange(d, p, 0)
     exchange(d, p, 1)

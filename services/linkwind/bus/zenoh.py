@@ -29,7 +29,12 @@ FIRST_RESEND = 0.5  # s; the first motion may be lost while declarations still t
 os.environ.setdefault("ZENOH_RUNTIME", "(rx: (handover: app), acc: (handover: app), tx: (handover: app))")
 
 
-def _open(listen: Sequence[str], connect: Sequence[str]) -> zenoh.Session:
+def open_session(listen: Sequence[str], connect: Sequence[str]) -> zenoh.Session:
+    """Open zenoh with linkwind's settings, on and to these endpoints.
+
+    Raises:
+        InputError: an endpoint cannot be opened.
+    """
     config = zenoh.Config()
     for key, value in {
         "mode": "peer",
@@ -39,6 +44,8 @@ def _open(listen: Sequence[str], connect: Sequence[str]) -> zenoh.Session:
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
         "transport/shared_memory/enabled": False,
+        # A lost peer is dialled again until the session closes, and closing waits for that call.
+        "transport/unicast/open_timeout": int(LEASE * 1000),
         "transport/link/tx/lease": int(LEASE * 1000),
         "transport/link/tx/keep_alive": 4,
     }.items():
@@ -64,7 +71,7 @@ class _Endpoint:
     """What both ends share: a queue of incoming messages whose reader can be woken up by trouble."""
 
     def __init__(self, listen: Sequence[str], connect: Sequence[str]) -> None:
-        self._session = _open(listen, connect)
+        self._session = open_session(listen, connect)
         self._trouble: LinkwindError | None = None
         self._reading = False
         self._closing = threading.Event()
@@ -145,7 +152,7 @@ class _Endpoint:
         self._look.set()
         if self._watchdog.is_alive():
             self._watchdog.join()
-        self._session.close()
+        self._session.close()  # type: ignore[no-untyped-call]
 
 
 class Exchanging(Protocol):

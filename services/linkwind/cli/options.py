@@ -13,12 +13,16 @@ OutOption = Annotated[
 ]
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Override a key, such as coupling.step=5e-4; repeatable."),
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Override a key, such as coupling.step=5e-4; repeatable."
+    ),
 ]
 ListenOption = Annotated[
-    list[str] | None, typer.Option("--listen", metavar="ENDPOINT", help="Listen here, such as tcp/0.0.0.0:7447.")
+    list[str] | None,
+    typer.Option("--listen", metavar="ENDPOINT", help="Listen here, such as tcp/0.0.0.0:7447."),
 ]
 ConnectOption = Annotated[
-    list[str] | None, typer.Option("--connect", metavar="ENDPOINT", help="Connect there, such as tcp/10.0.0.2:7447.")
+    list[str] | None,
+    typer.Option("--connect", metavar="ENDPOINT", help="Connect there, such as tcp/10.0.0.2:7447."),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]

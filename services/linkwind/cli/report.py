@@ -15,7 +15,9 @@ def register(app: typer.Typer) -> None:
 
 def report(
     log: Annotated[Path, typer.Argument(help="The MCAP log of a run.")],
-    out: Annotated[Path | None, typer.Option("--out", help="The page; report.html beside the log if not given.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="The page; report.html beside the log if not given.")
+    ] = None,
 ) -> None:
     """Write the HTML report of a log.
 

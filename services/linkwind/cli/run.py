@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from linkwind.cli.options import ConnectOption, JsonOption, ListenOption, OutOption, ScenarioArgument, SetOption
+from linkwind.cli.options import (
+    ConnectOption,
+    JsonOption,
+    ListenOption,
+    OutOption,
+    ScenarioArgument,
+    SetOption,
+)
 
 if TYPE_CHECKING:
     from linkwind.runs.run import Outcome, Progress

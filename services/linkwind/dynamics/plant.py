@@ -32,17 +32,21 @@ class MechanismPlant:
         self.multibody = Multibody(mechanism.tables)
         self.initial = State(self.multibody.initial_state(mechanism.q0, mechanism.v0), 0.0, 0.0)
         self._step = scenario.coupling.step_ns / 1e9
-        self._settings = {
-            "integrator": Integrator[scenario.dynamics.integrator.upper()],
-            "substeps": scenario.dynamics.substeps,
-            "rtol": scenario.dynamics.rtol,
-            "atol": scenario.dynamics.atol,
-        }
+        self._integrator = Integrator[scenario.dynamics.integrator.upper()]
+        self._dynamics = scenario.dynamics
 
     def advance(self, state: State, nodes: Array, wrenches: Array, added_inertia: Array | None) -> State:
         """Return the state one macro step later; see :class:`linkwind.coupling.Plant`."""
         values, work = self.multibody.advance(
-            state.values, self._step, nodes, wrenches, added_inertia, **self._settings
+            state.values,
+            self._step,
+            nodes,
+            wrenches,
+            added_inertia,
+            integrator=self._integrator,
+            substeps=self._dynamics.substeps,
+            rtol=self._dynamics.rtol,
+            atol=self._dynamics.atol,
         )
         external, dissipated = work.tolist()
         return State(values, state.external_work + external, state.dissipated_work + dissipated)

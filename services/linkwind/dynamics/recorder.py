@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-from pathlib import Path
 
 import numpy as np
 
@@ -25,7 +24,9 @@ class Recorder:
         force_max: largest aerodynamic force on a body so far [N].
     """
 
-    def __init__(self, log: LogWriter, scenario: Scenario, mechanism: Mechanism, multibody: Multibody) -> None:
+    def __init__(
+        self, log: LogWriter, scenario: Scenario, mechanism: Mechanism, multibody: Multibody
+    ) -> None:
         n = multibody.n
         self.joint_gap_max = 0.0
         self.force_max = 0.0

@@ -23,7 +23,9 @@ def create(name: str, out: Path | None) -> Path:
         if out is not None:
             out.mkdir(parents=True, exist_ok=True)
             if any(out.iterdir()):
-                raise InputError(f"{out}: expected a new or empty folder; got one with files. Choose another --out")
+                raise InputError(
+                    f"{out}: expected a new or empty folder; got one with files. Choose another --out"
+                )
             return out
         stem = f"{name}-{time.strftime('%Y%m%d-%H%M%S')}"
         for attempt in range(1, 1000):
@@ -34,7 +36,9 @@ def create(name: str, out: Path | None) -> Path:
                 continue
             return folder
     except OSError as error:
-        raise InputError(f"{error.filename}: cannot create the folder of the run: {error.strerror}") from error
+        raise InputError(
+            f"{error.filename}: cannot create the folder of the run: {error.strerror}"
+        ) from error
     raise InputError(f"runs/{stem}: expected a free name; got none in 1000 tries. Choose one with --out")
 
 

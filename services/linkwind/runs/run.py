@@ -89,7 +89,13 @@ def run(scenario: Scenario, out: Path | None, progress: Progress) -> Outcome:
 
 
 def dynamics(
-    scenario: Scenario, out: Path | None, progress: Progress, *, run_id: str, listen: Sequence[str], connect: Sequence[str]
+    scenario: Scenario,
+    out: Path | None,
+    progress: Progress,
+    *,
+    run_id: str,
+    listen: Sequence[str],
+    connect: Sequence[str],
 ) -> Outcome:
     """Run the dynamics alone; the providers come from elsewhere. See :func:`run`."""
     folder = folders.create(scenario.name, out)
@@ -111,7 +117,11 @@ def _drive(
 
     log, report = folder / "log.mcap", folder / "report.html"
     try:
-        with terminate_as_interrupt(), _open_log(log, scenario, service) as writer, closing(open_link()) as link:
+        with (
+            terminate_as_interrupt(),
+            _open_log(log, scenario, service) as writer,
+            closing(open_link()) as link,
+        ):
             recorder = Recorder(writer, scenario, service.mechanism, service.multibody)
             result = service.run(link, recorder, progress, poll)
             writer.close(final_state_sha256=result.final_state_sha256)

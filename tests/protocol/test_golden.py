@@ -1,0 +1,134 @@
+"""Golden vectors: bytes made by the protobuf library alone, for implementations in other languages.
+
+``python -m tests.protocol.test_golden`` writes the files again after a change of the schema.
+"""
+
+from __future__ import annotations
+
+import json
+import runpy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from google.protobuf.json_format import MessageToDict, ParseDict
+
+from linkwind.messages import MotionMessage, WrenchMessage
+from linkwind.schema import MESSAGES
+
+GOLDEN = Path(__file__).parents[2] / "schemas" / "golden"
+
+
+def numbers(count: int, start: float) -> list[float]:
+    """Distinct numbers, none of them exact in binary, one negative zero."""
+    return [start + i / 10 for i in range(count - 1)] + [-0.0]
+
+
+def vectors() -> dict[str, tuple[str, dict[str, Any]]]:
+    motion = {
+        "position": numbers(6, 0.1),
+        "orientation": numbers(8, -3.0),
+        "linear": numbers(6, 100.0),
+        "angular": numbers(6, -1e-9),
+    }
+    rest = {name: [0.0] * len(values) for name, values in motion.items()}
+    step = {"run": "golden", "step": "120", "iteration": 1, "timeNs": "120000000"}
+    wrench = {**step, "provider": "aero", "kind": "WRENCH_KIND_POINT"}
+    loads = {"force": numbers(6, 0.7), "torque": numbers(6, -12.3)}
+    return {
+        "motion": ("MotionStep", {**step, "final": 0, "accepted": motion, "trial": rest}),
+        "motion_final": ("MotionStep", {**step, "final": 1, "accepted": motion, "trial": motion}),
+        "wrench": ("WrenchStep", {**wrench, **loads}),
+        "wrench_added_inertia": ("WrenchStep", {**wrench, **loads, "addedInertia": numbers(72, 0.3)}),
+        "hello": (
+            "Control",
+            {"hello": {"name": "aero", "schemaSha256": "00", "version": "0.1.0", "instance": "i"}},
+        ),
+    }
+
+
+def write() -> None:
+    for name, (message, values) in vectors().items():
+        encoded = ParseDict(values, MESSAGES[message]()).SerializeToString(deterministic=True)
+        text = json.dumps(
+            {"message": f"linkwind.v1.{message}", "values": values, "bytes": encoded.hex()}, indent=1
+        )
+        (GOLDEN / f"{name}.json").write_text(text + "\n")
+
+
+def golden(name: str) -> tuple[dict[str, Any], bytes]:
+    file = json.loads((GOLDEN / f"{name}.json").read_text())
+    return file["values"], bytes.fromhex(file["bytes"])
+
+
+@pytest.mark.parametrize("name", list(vectors()))
+def test_files_are_current_and_parse_to_their_values(name: str) -> None:
+    message, expected = vectors()[name]
+    values, encoded = golden(name)
+    assert values == expected
+    parsed = MESSAGES[message].FromString(encoded)
+    assert MessageToDict(parsed) == MessageToDict(ParseDict(expected, MESSAGES[message]()))
+
+
+@pytest.mark.parametrize("name", ["motion", "motion_final"])
+def test_motion_is_written_and_read_as_the_golden_bytes(name: str) -> None:
+    values, encoded = golden(name)
+    written = MotionMessage("golden", 2)
+    written.stamp(int(values["step"]), values["iteration"], int(values["timeNs"]))
+    written.final = bool(values["final"])
+    for state in ("accepted", "trial"):
+        for field, numbers_ in values[state].items():
+            getattr(getattr(written, state), field).ravel()[:] = numbers_
+    assert written.payload() == encoded
+    read = MotionMessage("golden", 2)
+    read.load(encoded, "golden")
+    assert (read.step, read.iteration, read.time_ns, read.final) == (
+        120,
+        1,
+        120_000_000,
+        name == "motion_final",
+    )
+    assert read.accepted.position.tobytes() == np.array(values["accepted"]["position"]).tobytes()
+
+
+@pytest.mark.parametrize("added", [False, True])
+def test_wrench_is_written_and_read_as_the_golden_bytes(added: bool) -> None:
+    values, encoded = golden("wrench_added_inertia" if added else "wrench")
+    written = WrenchMessage("golden", "aero", 2, added_inertia=added)
+    written.stamp(120, 1, 120_000_000)
+    written.wrench.force.ravel()[:] = values["force"]
+    written.wrench.torque.ravel()[:] = values["torque"]
+    if written.wrench.added_inertia is not None:
+        written.wrench.added_inertia.ravel()[:] = values["addedInertia"]
+    assert written.payload() == encoded
+    read = WrenchMessage("golden", "aero", 2, added_inertia=added)
+    read.load(encoded, "golden")
+    assert read.wrench.torque.tobytes() == np.array(values["torque"]).tobytes()
+
+
+def test_reader_takes_what_any_protobuf_writer_may_write() -> None:
+    """Fields in another order, arrays not packed: legal protobuf, other bytes."""
+    values, encoded = golden("wrench")
+    message = MESSAGES["WrenchStep"].FromString(encoded)
+    torque, rest = MESSAGES["WrenchStep"](torque=message.torque), MESSAGES["WrenchStep"].FromString(encoded)
+    rest.ClearField("torque")
+    force_unpacked = b"".join(b"\x39" + np.float64(f).tobytes() for f in message.force)
+    rest.ClearField("force")
+    shuffled = torque.SerializeToString() + force_unpacked + rest.SerializeToString()
+    assert shuffled != encoded
+    read = WrenchMessage("golden", "aero", 2)
+    read.load(shuffled, "golden")
+    assert read.wrench.force.ravel().tolist() == values["force"]
+    assert read.payload() == encoded
+
+
+def test_descriptor_set_is_current(tmp_path: Path) -> None:
+    schemas = runpy.run_path(str(GOLDEN.parent / "compile.py"))
+    fresh = tmp_path / "linkwind.binpb"
+    schemas["compile_to"](fresh)
+    assert fresh.read_bytes() == schemas["TARGET"].read_bytes()
+
+
+if __name__ == "__main__":
+    write()
