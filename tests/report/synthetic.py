@@ -152,6 +152,7 @@ def run_of(description, path, errors, **changes) -> Run:
         "coupling_time": path.t,
         "order": order,
         "extrapolation_error": errors,
+        "interface_energy": 1e-7 * random.normal(size=k),
         "exchange": random.lognormal(np.log(70e-6), 0.25, k),
     }
     return Run(**{**values, **changes})

@@ -201,7 +201,7 @@ def test_a_log_without_an_end_says_so():
 
 def test_a_log_without_a_state_still_has_a_page():
     run = planar(3)
-    names = ("coupling_time", "order", "extrapolation_error", "exchange")
+    names = ("coupling_time", "order", "extrapolation_error", "interface_energy", "exchange")
     nothing = {name: getattr(run, name)[:0] for name in names}
     nothing |= {"trajectory": no_trajectory(2), "complete": False, "error": "never came"}
     page = Page(render(dataclasses.replace(run, **nothing)))

@@ -32,6 +32,8 @@ class Run:
         coupling_time: t of each exchange [s], shape (m,).
         order: degree of the extrapolation, shape (m,).
         extrapolation_error: E_0 … E_p by degree, shape (m, p+1), NaN where not measured.
+        interface_energy: step size times the power of the wrench on trial minus accepted twist [J],
+            shape (m,).
         exchange: wall time of each exchange [s], shape (m,).
     """
 
@@ -43,6 +45,7 @@ class Run:
     coupling_time: Array
     order: NDArray[Any]
     extrapolation_error: Array
+    interface_energy: Array
     exchange: Array
 
     @property
@@ -127,6 +130,7 @@ def read(path: Path) -> Run:
         coupling_time=coupling.t if coupling else np.empty(0),
         order=coupling.order if coupling else np.empty(0),
         extrapolation_error=coupling.extrapolation_error if coupling else np.empty((0, 0)),
+        interface_energy=coupling.interface_energy if coupling else np.empty(0),
         exchange=log.timing().exchange_ns / np.float64(1e9) if TIMING in log.topics else np.empty(0),
     )
 

@@ -46,10 +46,14 @@ def tiles(run: Run) -> str:
     shown = [
         ("Simulated", end, f"{run.steps} steps of {_amount(coupling['step'], 's')}"),
         ("Coupling", scheme, how),
-        ("Largest force", _amount(run.largest_force, "N"), "aerodynamic, on a body"),
-        ("Largest joint gap", _amount(run.largest_gap, "m"), "of the poses as sent"),
+        ("Largest force", _amount(run.largest_force, "N"), "of the air on a body"),
+        (
+            "Largest joint gap",
+            _amount(run.largest_gap, "m"),
+            "of the poses as sent" if run.scenario["joints"] else "no joints",
+        ),
         ("Energy off by", _amount(off, "J"), "at most, since t₀"),
-        ("Exchange", _amount(median, "s"), f"median; 99 %: {_amount(late, 's')}"),
+        ("Median exchange", _amount(median, "s"), f"99 % in {_amount(late, 's')}"),
         ("Final state", digest[:8] if digest else "–", "SHA-256, in full below"),
     ]
     return "\n".join(

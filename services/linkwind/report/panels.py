@@ -26,7 +26,7 @@ def points_per_curve(run: Run) -> int:
 
 def panels(run: Run) -> list[dict[str, Any]]:
     """Return the plots of a run in reading order; those that have nothing to show are left out."""
-    every = (_velocity, _aerodynamic, _joints, _energy, _coupling, _exchange)
+    every = (_velocity, _aerodynamic, _joints, _coupling, _energy, _exchange)
     made = (panel(run) for panel in every)
     return [panel for panel in made if panel is not None]
 
@@ -133,7 +133,10 @@ def _coupling(run: Run) -> dict[str, Any] | None:
     if np.isfinite(known).any():
         curves = [_curve(run, f"√E{'₀₁₂₃'[d]}", 2 + d, known[:, d], t) for d in range(known.shape[1])]
         rows.append(_row("√E<sub>d</sub> [m/s²]", *curves, log=True))
-    note = "Degree of the extrapolation; what each would have missed."
+    factor, unit = prefixed(largest(np.abs(run.interface_energy)) or 0.0, "J")
+    energy = _curve(run, "trial against accepted state", 7, run.interface_energy * factor, t)
+    rows.append(_row(f"ΔE [{unit}]", energy))
+    note = "Extrapolation: its degree, what each would miss, energy in a step."
     return _panel("Coupling", rows, note)
 
 

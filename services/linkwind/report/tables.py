@@ -32,6 +32,7 @@ _UNITS = {
     "wavenumber": "1/m",
     "phase_deg": "°",
 }
+_FIRST = ("name", "type", "model", "parent", "child", "mass", "inertia", "shape", "position")
 _SETTINGS = ("time", "environment", "dynamics", "coupling", "bus", "log")
 
 
@@ -68,10 +69,15 @@ def _records(items: Iterable[Mapping[str, Any]]) -> str:
     items = list(items)
     if not items:
         return ""
-    keys = list(dict.fromkeys(["name"] + [key for item in items for key, value in item.items() if value]))
+    keys = _ordered(key for item in items for key, value in item.items() if value or key == "name")
     head = "".join(f"<th>{_heading(key)}</th>" for key in keys)
     rows = ("".join(f"<td>{_text(item.get(key))}</td>" for key in keys) for item in items)
     return f"<table><tr>{head}</tr>" + "".join(f"<tr>{row}</tr>" for row in rows) + "</table>"
+
+
+def _ordered(keys: Iterable[str]) -> list[str]:
+    """Return each key once: first those that say what an item is, then the others as they come."""
+    return sorted(dict.fromkeys(keys), key=lambda key: _FIRST.index(key) if key in _FIRST else len(_FIRST))
 
 
 def _pairs(values: Mapping[str, Any], title: str = "") -> str:
@@ -105,6 +111,6 @@ def _text(value: Any) -> str:
         case [*items]:
             return "<br>".join(_text(item) for item in items)
         case Mapping():
-            return ", ".join(_part(key, item) for key, item in value.items() if item)
+            return ", ".join(_part(key, value[key]) for key in _ordered(value) if value[key])
         case _:
             return escape(str(value))
