@@ -34,7 +34,6 @@ def scenario(**changes):
         "dynamics": {"method": "reduced", "integrator": "rk4", "substeps": 1},
         "coupling": {"scheme": "pec", "order": 3, "adaptive": True, "step": 1e-3},
         "bus": {"transport": "zenoh"},
-        "log": {"checkpoint_every": 0},
         **changes,
     }
 

@@ -136,7 +136,7 @@ def _coupling(run: Run) -> dict[str, Any] | None:
     factor, unit = prefixed(largest(np.abs(run.interface_energy)) or 0.0, "J")
     energy = _curve(run, "trial against accepted state", 7, run.interface_energy * factor, t)
     rows.append(_row(f"ΔE [{unit}]", energy))
-    note = "Extrapolation: its degree, what each would miss, energy in a step."
+    note = "Extrapolation: degree, errors by degree, energy error."
     return _panel("Coupling", rows, note)
 
 

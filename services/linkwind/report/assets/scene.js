@@ -245,7 +245,7 @@ function makeScene(canvas, scene, clock) {
       const unit = forceScale() * camera.scale, newton = nice(80 / unit);
       pen.strokeStyle = pen.fillStyle = colour("force");
       arrow(pen, [x, y - 3], [x + newton * unit, y - 3], 11);
-      pen.fillText(`${number(newton)} N aerodynamic force`, x + newton * unit + 7, y + 1);
+      pen.fillText(`${number(newton)} N${camera.w < 440 ? "" : " aerodynamic force"}`, x + newton * unit + 7, y + 1);
     }
     if (windSpeed) {
       const along = camera.turn(scene.wind).map((part) => part / windSpeed * 46);
