@@ -12,7 +12,7 @@ from tests.scenario.texts import SMALL, TWO_LINK, edited
 
 BODY_KEYS = "name, mass, inertia, shape, position, angle_deg, orientation, velocity, angular_velocity"
 TOP_KEYS = (
-    "name, description, time, environment, bodies, joints, providers, dynamics, coupling, bus, log, aero"
+    "name, description, time, environment, bodies, joints, providers, dynamics, coupling, bus, aero"
 )
 SECOND_HINGE = """
 [[joints]]
@@ -32,11 +32,11 @@ WRONG = [
     ("mass = 2.0", "mas = 2.0",
      f'bodies[0].mas: expected a key among {BODY_KEYS}; got "mas". Use "mass".'),
     ("[aero.plate]", "[aero.plat]",
-     'aero.plat: expected a key among name, model, bodies, every, plate, field; got "plat". Use "plate".'),
+     'aero.plat: expected a key among name, model, bodies, plate, field; got "plat". Use "plate".'),
     ("[dynamics]", "[dynamic]",
      f'dynamic: expected a key among {TOP_KEYS}; got "dynamic". Use "dynamics".'),
     ("order = 3", "order = 3\nqqq = 1",
-     "coupling.qqq: expected a key among scheme, order, adaptive, step, timeout, use_affine; "
+     "coupling.qqq: expected a key among scheme, order, adaptive, step, timeout; "
      'got "qqq". Remove it.'),
     ("[aero]", '[aero]\nname = "wind"',
      'aero.name: expected no name besides aero; got "wind". Remove it, or write [[providers]].'),
@@ -256,7 +256,7 @@ KEYS = [
     "bodies", "bodies.0", "bodies.0.inertia", "bodies.0.name", "bodies.0.orientation", "bodies.0.shape",
     "bodies.0.angular_velocity", "bodies.1.position", "joints", "joints.0", "joints.0.rest", "joints.0.child",
     "providers", "providers.0", "providers.0.bodies", "providers.0.field", "providers.0.field.link1",
-    "providers.0.field.link1.let", "providers.0.every", "aero", "environment.gusts", "environment.wind",
+    "providers.0.field.link1.let", "aero", "environment.gusts", "environment.wind",
     "coupling.step", "coupling.order", "time.end", "name", "time", "log", "unknown",
 ]  # fmt: skip
 

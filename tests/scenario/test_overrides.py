@@ -25,7 +25,7 @@ GUST = "environment.gusts=[{ amplitude = [1, 0], frequency = 2.5 }]"
         (["environment.wind.0=-3"], lambda s: s.environment.wind, (-3.0, 0.0, 0.0)),
         (["environment.wind=[-3, 1]"], lambda s: s.environment.wind, (-3.0, 1.0, 0.0)),
         (["bus.transport=inprocess"], lambda s: s.bus.transport, "inprocess"),
-        (["log.checkpoint_every=10"], lambda s: s.log.checkpoint_every, 10),
+        (["bus.start_timeout=10"], lambda s: s.bus.start_timeout, 10.0),
         (["description=two words = fun"], lambda s: s.description, "two words = fun"),
         (["name=other"], lambda s: s.name, "other"),
         ([GUST, "environment.gusts.0.phase_deg=90"], lambda s: s.environment.gusts[0].phase_deg, 90.0),
@@ -36,7 +36,7 @@ GUST = "environment.gusts=[{ amplitude = [1, 0], frequency = 2.5 }]"
 def test_an_override_takes_effect_and_nothing_else_changes(arguments, read, value):
     plain, changed = load("two_link"), load("two_link", arguments)
     assert read(changed) == value
-    untouched = {"bodies", "joints", "environment", "providers", "coupling", "dynamics", "bus", "log", "time"}
+    untouched = {"bodies", "joints", "environment", "providers", "coupling", "dynamics", "bus", "time"}
     untouched -= {argument.split(".")[0].split("=")[0].replace("aero", "providers") for argument in arguments}
     for name in untouched:
         assert getattr(changed, name) == getattr(plain, name)
@@ -51,11 +51,11 @@ def test_aero_can_be_set_where_the_file_has_no_provider():
     ("argument", "line"),
     [
         ("coupling.stepp=3",
-         "coupling.stepp: expected a key among scheme, order, adaptive, step, timeout, use_affine; "
+         "coupling.stepp: expected a key among scheme, order, adaptive, step, timeout; "
          'got "stepp". Use "step".'),
         ("couplin.step=3",
          "couplin: expected a key among name, description, time, environment, bodies, joints, providers, "
-         'dynamics, coupling, bus, log, aero; got "couplin". Use "coupling".'),
+         'dynamics, coupling, bus, aero; got "couplin". Use "coupling".'),
         ("coupling", 'expected KEY=VALUE; got "coupling". For example coupling.step=5e-4.'),
         ("=3", 'expected KEY=VALUE; got "=3". For example coupling.step=5e-4.'),
         ("coupling..step=3", 'expected KEY=VALUE; got "coupling..step=3". For example coupling.step=5e-4.'),
@@ -67,7 +67,7 @@ def test_aero_can_be_set_where_the_file_has_no_provider():
          'bodies: expected the index or name of an entry: link1, link2; got "-1". Use one of these.'),
         ("cfd.model=plate",
          "cfd: expected a key among name, description, time, environment, bodies, joints, providers, "
-         'dynamics, coupling, bus, log, aero; got "cfd". Remove it.'),
+         'dynamics, coupling, bus, aero; got "cfd". Remove it.'),
         ("environment.wind.3=2",
          'environment.wind: expected an index from 0 to 2; got "3". Use one of these.'),
         ("environment.gusts.0.frequency=1",

@@ -47,7 +47,6 @@ def scenarios(draw):
     provider = {
         "name": draw(NAMES),
         "model": "field",
-        "every": draw(st.integers(1, 9)),
         "field": {names[0]: {"fx": draw(st.text(max_size=10)), "let": [list(pair) for pair in let]}},
     }
     step_ns, steps = draw(st.integers(1, 10**9)), draw(st.integers(1, 100))

@@ -9,7 +9,7 @@ from linkwind.scenario.bodies import Body, Joint, Plate
 from linkwind.scenario.loading import builtin_names, from_json, load, loads, template
 from linkwind.scenario.model import Scenario
 from linkwind.scenario.providers import FieldExpressions, PlateModel, Provider
-from linkwind.scenario.settings import Bus, Coupling, Dynamics, Environment, Gust, Log, Time
+from linkwind.scenario.settings import Bus, Coupling, Dynamics, Environment, Gust, Time
 
 __all__ = [
     "Body",
@@ -20,7 +20,6 @@ __all__ = [
     "FieldExpressions",
     "Gust",
     "Joint",
-    "Log",
     "Plate",
     "PlateModel",
     "Provider",

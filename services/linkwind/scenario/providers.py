@@ -78,7 +78,6 @@ class Provider(Section):
     bodies: tuple[Name, ...] = Field(
         default=(), strict=False, min_length=1, description="Names of the bodies it acts on; default: all"
     )
-    every: int = Field(default=1, ge=1, description="Exchange once in this many communication steps")
     plate: PlateModel = Field(default=PlateModel(), description="Settings of the model plate")
     field: dict[str, FieldExpressions] = Field(
         default={}, description="The model field: a table for each body, by its name"

@@ -1,4 +1,4 @@
-"""How a scenario is computed: time, surroundings, dynamics, coupling, bus and log."""
+"""How a scenario is computed: time, surroundings, dynamics, coupling and bus."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from linkwind.scenario.quantities import Section, Vector, quantity
 Method = Literal["reduced"]
 IntegratorName = Literal["euler", "semi_implicit_euler", "rk4", "dopri5"]
 Scheme = Literal["explicit", "pec"]
-UseAffine = Literal["auto", "never"]
 Transport = Literal["zenoh", "inprocess"]
 
 ZERO = (0.0, 0.0, 0.0)
@@ -75,9 +74,6 @@ class Coupling(Section):
     timeout: float = quantity(
         "Wait this long for an answer from a participant that is alive", "s", 2.0, gt=0.0
     )
-    use_affine: UseAffine = Field(
-        default="auto", description="Use the added inertia that a provider returns, or never"
-    )
 
     @field_validator("step")
     @classmethod
@@ -103,9 +99,3 @@ class Bus(Section):
         default="zenoh", description="zenoh: separate processes; inprocess: everything in one process"
     )
     start_timeout: float = quantity("Wait this long for every participant to be ready", "s", 60.0, gt=0.0)
-
-
-class Log(Section):
-    """What is written besides the exchanged messages."""
-
-    checkpoint_every: int = Field(default=0, ge=0, description="Steps between checkpoints [1]; 0: none")
