@@ -185,22 +185,21 @@ static int dormand_prince(lw_run *run) {
     lw_multibody *mb = run->mb;
     double time = 0.0, h = run->step->h, limit = run->step->h / run->step->substeps, largest = 5.0;
     double next = run->proposed > 0.0 ? fmin(run->proposed, limit) : limit;
-    int status = derive(run, 0.0, mb->y, mb->rate[0]);
+    int trouble = LW_OK, status = derive(run, 0.0, mb->y, mb->rate[0]);
     if (run->proposed <= 0.0) run->proposed = next;
     while (!status && time < h) {
         int last = time + 1.01 * next >= h;
         double step = last ? h - time : next;
         if (step < 1e-13 * h) {
             run->step->fault->time = time;
-            return LW_STEP_UNDERFLOW;
+            return trouble ? trouble : LW_STEP_UNDERFLOW;
         }
-        status = stages(run, &dopri5, 1, time / h, step / h, step);
-        if (status && status != LW_NOT_FINITE) return status; /* an overflow is too long a step */
-        double norm = status ? HUGE_VAL : error_norm(run, step), factor = step_factor(norm);
+        /* A stage that cannot be evaluated means that the step is too long, until none is short enough. */
+        trouble = stages(run, &dopri5, 1, time / h, step / h, step);
+        double norm = trouble ? HUGE_VAL : error_norm(run, step), factor = step_factor(norm);
         int clipped = factor >= largest;
         next = step * fmin(factor, largest);
         largest = norm <= 1.0 ? 5.0 : 1.0; /* no growth right after a rejection */
-        status = LW_OK;
         if (norm <= 1.0) {
             /* A step cut short by the end of the macro step says nothing against a longer one. */
             run->proposed = last && clipped ? fmax(next, run->proposed) : next;
