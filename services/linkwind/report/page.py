@@ -18,7 +18,7 @@ from linkwind.report.scene import scene
 from linkwind.report.tables import tables
 
 _ASSETS = files("linkwind.report").joinpath("assets")
-_SCRIPTS = ("clock.js", "charts.js", "scene.js", "main.js")
+_SCRIPTS = ("clock.js", "charts.js", "motion.js", "scene.js", "main.js")
 
 
 def render(run: Run) -> str:
