@@ -54,7 +54,7 @@ typedef enum {
     LW_BAD_INTEGRATOR,
     LW_BAD_SUBSTEPS,
     LW_BAD_TOLERANCE,
-    /* tables, named like the field; item: its row */
+    /* tables, named like the field; item: its row, of a spring's or damper's table its coordinate */
     LW_BAD_COUNT = 40,
     LW_BAD_PARENT,
     LW_BAD_ORDER,

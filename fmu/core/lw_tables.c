@@ -72,13 +72,11 @@ static int check_mass(const lw_tables *t, int i) {
 
 /* The rest of a rotation is a quaternion that must have a direction. */
 static int check_rest(const lw_tables *t, int i) {
-    int type = t->joint_type[i], nq = lw_joint_nq(type);
-    const double *rest = t->rest + t->q_index[i];
-    if (!all_finite(rest, nq)) return LW_BAD_REST;
+    int type = t->joint_type[i];
     if (type != LW_SPHERICAL && type != LW_FREE) return LW_OK;
-    const double *quat = rest + nq - 4;
-    return quat[0] * quat[0] + quat[1] * quat[1] + quat[2] * quat[2] + quat[3] * quat[3] > 0.0
-               ? LW_OK : LW_BAD_REST;
+    const double *quat = t->rest + t->q_index[i] + lw_joint_nq(type) - 4;
+    double square = quat[0] * quat[0] + quat[1] * quat[1] + quat[2] * quat[2] + quat[3] * quat[3];
+    return square > 0.0 ? LW_OK : LW_BAD_REST;
 }
 
 static int check_row(const lw_tables *t, int i) {
@@ -91,20 +89,28 @@ static int check_row(const lw_tables *t, int i) {
     return LW_OK;
 }
 
-int lw_tables_check(const lw_tables *t, lw_fault *fault) {
-    fault->item = 0;
-    fault->time = 0.0;
-    if (t->n < 1 || t->nq < 0 || t->nv < 0) return LW_BAD_COUNT;
-    if (!all_finite(t->gravity, 3)) return LW_BAD_GRAVITY;
-    for (int i = 0; i < t->n; ++i) {
-        int status = check_row(t, i);
-        fault->item = i;
-        if (status) return status;
-    }
+static int check_coordinate_values(const lw_tables *t, lw_fault *fault) {
     for (int k = 0; k < t->nv; ++k) {
         fault->item = k;
         if (!isfinite(t->stiffness[k])) return LW_BAD_STIFFNESS;
         if (!isfinite(t->damping[k])) return LW_BAD_DAMPING;
     }
+    for (int k = 0; k < t->nq; ++k) {
+        fault->item = k;
+        if (!isfinite(t->rest[k])) return LW_BAD_REST;
+    }
     return LW_OK;
+}
+
+int lw_tables_check(const lw_tables *t, lw_fault *fault) {
+    fault->item = 0;
+    fault->time = 0.0;
+    if (t->n < 1 || t->nq < 0 || t->nv < 0) return LW_BAD_COUNT;
+    if (!all_finite(t->gravity, 3)) return LW_BAD_GRAVITY;
+    int status = check_coordinate_values(t, fault);
+    for (int i = 0; i < t->n && !status; ++i) {
+        status = check_row(t, i);
+        fault->item = status == LW_BAD_REST ? t->q_index[i] : i;
+    }
+    return status;
 }
