@@ -73,7 +73,7 @@ class CommunicationPoint(NamedTuple):
         step: k.
         state: accepted at t_k.
         trial: the state on which the wrench at t_k was evaluated.
-        wrench: at t_k, shape (n, 6): the last answer for it. A copy.
+        wrench: at t_k, shape (n, 6): the last answer for it, or what `startup` put in its place. A copy.
         added_inertia: that came with it, shape (n, 6, 6); None for none.
         order: degree of the extrapolation that led to the trial.
         errors: extrapolation error by degree 0 … p, smoothed (E of `degree`), NaN in the start-up; empty
