@@ -10,7 +10,12 @@ class FakeModel:
     """force = −velocity, torque x = value; remembers its calls."""
 
     def __init__(
-        self, *, rollback: bool = True, added_inertia: bool = False, response_size: int = 0, value: float = 0.0
+        self,
+        *,
+        rollback: bool = True,
+        added_inertia: bool = False,
+        response_size: int = 0,
+        value: float = 0.0,
     ) -> None:
         self.capabilities = Capabilities(
             rollback=rollback, added_inertia=added_inertia, response_size=response_size

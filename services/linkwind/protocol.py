@@ -194,7 +194,7 @@ class ProviderSession:
 
         Raises:
             ProtocolError: a gap, a message of another run, or an iteration without rollback.
-            SimulationError: the model failed or its wrench is not finite.
+            SimulationError: the model failed.
         """
         motion = self._motion
         motion.load(payload, f'"{self.name}": motion')
@@ -214,7 +214,6 @@ class ProviderSession:
         self._model.evaluate(motion.time_ns / 1e9, motion.trial, self._wrench.wrench)
         self._wrench.stamp(at[0], at[1], motion.time_ns)
         self.at = at
-        check_finite(self._wrench.wrench, self.name, self._bodies, at[0], motion.time_ns)
         self._answer = self._wrench.payload()
         return self._answer
 
@@ -245,24 +244,6 @@ class ProviderSession:
         """Return the message that tells the others that this provider cannot go on."""
         step, iteration = (self._motion.step, self._motion.iteration) if self.run else (0, 0)
         return fault(self.name, step, iteration, error)
-
-
-def check_finite(wrench: Wrench, provider: str, bodies: Sequence[str], step: int, time_ns: int) -> None:
-    """Raise SimulationError, naming provider, body and step, unless every number is finite."""
-    arrays = {"force": wrench.force, "torque": wrench.torque, "added_inertia": wrench.added_inertia}
-    # One sum tells; which number it was is only looked for when something is wrong.
-    total = wrench.force.sum() + wrench.torque.sum()
-    if wrench.added_inertia is not None:
-        total += wrench.added_inertia.sum()
-    if np.isfinite(total):
-        return
-    for name, array in arrays.items():
-        if array is not None and not np.isfinite(array).all():
-            body = int(np.argwhere(~np.isfinite(array))[0][0])
-            raise SimulationError(
-                f'"{provider}": step {step} (t = {time_ns / 1e9:g} s): {name} on {bodies[body]}: expected '
-                f"finite numbers; got {array[body].ravel().tolist()}"
-            )
 
 
 @dataclass
@@ -317,6 +298,12 @@ class DynamicsSession:
         self._scenario_json = scenario_json
         self._steps = steps
         self._waiting = 0
+        n = len(bodies)
+        self._numbers = np.zeros(42 * n)
+        self._wrench = self._numbers[: 6 * n].reshape(n, 6)
+        self._force, self._torque = self._wrench[:, :3], self._wrench[:, 3:]
+        self._added = self._numbers[6 * n :].reshape(n, 6, 6)
+        self._has_added = False
         index = {name: i for i, name in enumerate(bodies)}
         self._participants = {
             name: _Participant(
@@ -385,6 +372,7 @@ class DynamicsSession:
             diagnostics=known.diagnostics,
         )
         known.ready = True
+        self._has_added |= ready.added_inertia
         return Control(start={})
 
     def _on_bye(self, message: Any) -> Any:
@@ -449,7 +437,6 @@ class DynamicsSession:
 
         Raises:
             ProtocolError: unknown provider, another run, or a step that was not asked for.
-            SimulationError: a number is not finite.
         """
         known = self._participants.get(provider)
         if known is None or known.message is None:
@@ -466,36 +453,49 @@ class DynamicsSession:
                 f'wrench from "{provider}": expected step {asked[0]} iteration {asked[1]}; got step {at[0]} '
                 f"iteration {at[1]}"
             )
-        names = [self.bodies[i] for i in known.bodies]
-        check_finite(message.wrench, provider, names, at[0], self.motion.time_ns)
         known.answered = True
         known.payload = payload
         self._waiting -= 1
         return True
 
-    def total(self, wrench: Array, added_inertia: Array) -> bool:
+    def total(self) -> tuple[Array, Array | None]:
         """Add up the answers of all providers, in the scenario's order.
 
-        Args:
-            wrench: result [N, N·m], shape (n, 6), force first, in W.
-            added_inertia: result ``A``, shape (n, 6, 6), body frame.
-
         Returns:
-            whether any provider returned an added inertia.
+            wrench [N, N·m], shape (n, 6), force first, in W, and added inertia ``A``, shape (n, 6, 6), body
+            frame, None if no provider returned one; both are written over by the next call.
+
+        Raises:
+            SimulationError: a number is not finite.
         """
-        wrench.fill(0.0)
-        has_added = False
+        self._wrench.fill(0.0)
+        if self._has_added:
+            self._added.fill(0.0)
         for p in self._participants.values():
             assert p.message is not None
             part = p.message.wrench
-            wrench[p.bodies_index, :3] += part.force
-            wrench[p.bodies_index, 3:] += part.torque
+            self._force[p.bodies_index] += part.force
+            self._torque[p.bodies_index] += part.torque
             if part.added_inertia is not None:
-                if not has_added:
-                    added_inertia[:] = 0.0
-                added_inertia[p.bodies_index] += part.added_inertia
-                has_added = True
-        return has_added
+                self._added[p.bodies_index] += part.added_inertia
+        self._check_finite()
+        return self._wrench, self._added if self._has_added else None
+
+    def _check_finite(self) -> None:
+        """Raise SimulationError, naming provider, body and step, unless every number is finite."""
+        if np.isfinite(self._numbers).all():
+            return
+        for p in self._participants.values():
+            assert p.message is not None
+            part = p.message.wrench
+            arrays = {"force": part.force, "torque": part.torque, "added inertia": part.added_inertia}
+            for name, array in arrays.items():
+                if array is not None and not np.isfinite(array).all():
+                    row = int(np.argwhere(~np.isfinite(array))[0][0])
+                    raise SimulationError(
+                        f'"{p.name}": {self.where()}: {name} on {self.bodies[p.bodies[row]]}: expected finite '
+                        f"numbers; got {array[row].ravel().tolist()}"
+                    )
 
 
 def _body_index(on: list[int], n: int) -> Any:

@@ -13,7 +13,7 @@ from linkwind.log.writer import LogWriter
 from linkwind.mechanism import Mechanism
 from linkwind.native.multibody import Multibody
 from linkwind.scenario import Scenario
-from linkwind.spatial import Motion, Wrench
+from linkwind.spatial import Array, Motion, Wrench
 
 
 class Recorder:
@@ -38,12 +38,13 @@ class Recorder:
         self._state = StateEncoder(n, multibody.nq, multibody.nv)
         self._step = StepEncoder(scenario.coupling.order)
         self._timing = TimingEncoder()
-        self._accepted, self._trial = Motion.at_rest(n), Motion.at_rest(n)
+        self._accepted, self._accepted_twist = _motion_and_twist(n)
+        self._trial, self._trial_twist = _motion_and_twist(n)
         self._total = Wrench.zeros(n)
-        # Twist norm: mass for the linear part, the mean principal inertia for the angular one.
-        tables = mechanism.tables
-        self._mass = tables.mass[:, None]
-        self._inertia = tables.inertia[:, :3].mean(axis=1)[:, None]
+        self._loads = np.zeros((2, n, 3))
+        # Norm of a twist: mass for the linear part, the mean principal inertia for the angular one.
+        inertia = mechanism.tables.inertia[:, :3].mean(axis=1)
+        self._twist_inertia = np.repeat([mechanism.tables.mass, inertia], 3)
 
     def point(self, point: CommunicationPoint) -> None:
         """Write an accepted communication point and what the coupling did to get there."""
@@ -80,12 +81,11 @@ class Recorder:
 
     def _coupling(self, point: CommunicationPoint, time_ns: int) -> None:
         """Write how far the trial state was from the accepted one, and the power lost between them."""
-        accepted, trial = self._accepted, self._trial
-        self._multibody.motion(point.trial.values, trial)
-        linear = accepted.linear - trial.linear
-        angular = accepted.angular - trial.angular
-        squared = (self._mass * linear * linear).sum() + (self._inertia * angular * angular).sum()
-        power = (point.wrench[:, :3] * linear).sum() + (point.wrench[:, 3:] * angular).sum()
+        self._multibody.motion(point.trial.values, self._trial)
+        difference = self._accepted_twist - self._trial_twist
+        np.copyto(self._loads, point.wrench.reshape(-1, 2, 3).swapaxes(0, 1))
+        squared = difference.dot(self._twist_inertia * difference)
+        power = difference.dot(self._loads.reshape(-1))
         payload = self._step.encode(
             point.step,
             time_ns,
@@ -100,6 +100,16 @@ class Recorder:
     def timing(self, step: int, time_ns: int, exchange_ns: int) -> None:
         """Write how long an exchange took on the wall clock."""
         self._log.timing(self._timing.encode(step, exchange_ns), time_ns)
+
+
+def _motion_and_twist(n: int) -> tuple[Motion, Array]:
+    """Return a motion of ``n`` bodies and its twists as one view, all linear first, shape (6n,)."""
+    flat = np.zeros(13 * n)
+    position, orientation, linear, angular = np.split(flat, [3 * n, 7 * n, 10 * n])
+    motion = Motion(
+        position.reshape(n, 3), orientation.reshape(n, 4), linear.reshape(n, 3), angular.reshape(n, 3)
+    )
+    return motion, flat[7 * n :]
 
 
 def tables_sha256(mechanism: Mechanism) -> str:

@@ -67,9 +67,6 @@ class DynamicsService:
         self.mechanism = mechanism
         self._plant = MechanismPlant(mechanism, scenario)
         self.multibody = self._plant.multibody
-        n = len(mechanism.bodies)
-        self._wrench = np.zeros((n, 6))
-        self._added_inertia = np.zeros((n, 6, 6))
         self._pending: deque[CommunicationPoint] = deque()
         self._exchange_ns = np.zeros(scenario.steps + 1, dtype=np.int64)
         self._exchanges = 0
@@ -157,8 +154,7 @@ class DynamicsService:
             if session.accept(provider, answer):
                 self._recorder.wrench(provider, answer, motion.time_ns)
         self._count(step, time.perf_counter_ns() - start)
-        has_added = session.total(self._wrench, self._added_inertia)
-        return Answer(self._wrench, self._added_inertia if has_added else None)
+        return Answer(*session.total())
 
     def _count(self, step: int, exchange_ns: int) -> None:
         if self._exchanges == len(self._exchange_ns):
