@@ -45,13 +45,13 @@ def run(
     yield from points
     accepted, newest = points[-1].state, history.wrenches[0]
     for step in range(len(points), steps + 1):
-        p = degree.next
-        nodes, wrenches = history.behind[p + 1]
+        d = degree.next
+        nodes, wrenches = history.behind[d + 1]
         trial = plant.advance(accepted, nodes, wrenches, history.added_inertia)
         history.add(step, exchange(step, 0, accepted, trial))
         degree.add(newest)
         nodes, wrenches = history.through[min(through, history.count)]
         accepted = plant.advance(accepted, nodes, wrenches, history.added_inertia)
         yield CommunicationPoint(
-            step, accepted, trial, newest.copy(), history.added_inertia, p, degree.errors, 1
+            step, accepted, trial, newest.copy(), history.added_inertia, d, degree.errors, 1
         )
