@@ -132,8 +132,7 @@ class DynamicsService:
         stride = max(1, scenario.steps // 200)
         state = self._plant.initial
         for point in scheme(self._plant, self._exchange, state, scenario.steps, settings):
-            # The scheme reuses its arrays; the log is written while the next answer is awaited.
-            self._pending.append(_own(point))
+            self._pending.append(point)  # written while the next answer is awaited
             state = point.state
             if point.step % stride == 0:
                 progress(point.step)
@@ -184,12 +183,6 @@ class DynamicsService:
         self._plant.multibody.motion(final.values, motion)
         parts = [motion.position, motion.orientation, motion.linear, motion.angular]
         return hashlib.sha256(np.hstack(parts).astype("<f8").tobytes()).hexdigest()
-
-
-def _own(point: CommunicationPoint) -> CommunicationPoint:
-    """Return ``point`` with copies of what the scheme will write over."""
-    added = point.added_inertia
-    return point._replace(wrench=point.wrench.copy(), added_inertia=None if added is None else added.copy())
 
 
 def acceleration_weight(mechanism: Mechanism) -> Array:
