@@ -31,7 +31,7 @@
     X(POSITION, 3 * n) X(ORIENTATION, 4 * n) X(LINEAR, 3 * n) X(ANGULAR, 3 * n)
 #define LW_AERO_CALCULATED(X) X(FORCE, 3 * n) X(TORQUE, 3 * n) X(ADDED_INERTIA, 36 * n)
 
-/* A section's number counts from 0 within its part's list: LW_DYNAMICS_MASS = 0 ..., LW_AERO_DENSITY = 0 ... */
+/* A section's number counts from 0 within its part: LW_DYNAMICS_MASS = 0 ..., LW_AERO_DENSITY = 0 ... */
 #define LW_ENUMERATE_DYNAMICS(name, size) LW_DYNAMICS_##name,
 #define LW_ENUMERATE_AERO(name, size) LW_AERO_##name,
 enum {
