@@ -8,27 +8,26 @@
 /* A pivot below this fraction of the terms it is the difference of holds round-off only. */
 static const double pivot_tolerance = 1.5e-14;
 
-static const lw_inertia6 massless = {{0.0, 0.0, 0.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0},
-                                     {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0}};
+static const lw_mat3 no_coupling = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
 
-static lw_spatial inertia_times(const lw_inertia6 *i, lw_spatial a) {
+LW_INLINE lw_spatial inertia_times(const lw_inertia6 *i, lw_spatial a) {
     lw_spatial f = {lw_add(lw_sym_vec(i->m, a.linear), lw_mat_vec(i->h, a.angular)),
                     lw_add(lw_mat_tvec(i->h, a.linear), lw_sym_vec(i->j, a.angular))};
     return f;
 }
 
-static double power(lw_spatial f, lw_spatial v) {
+LW_INLINE double power(lw_spatial f, lw_spatial v) {
     return lw_dot(f.linear, v.linear) + lw_dot(f.angular, v.angular);
 }
 
-static lw_spatial spatial_axpy(double s, lw_spatial a, lw_spatial b) {
+LW_INLINE lw_spatial spatial_axpy(double s, lw_spatial a, lw_spatial b) {
     lw_spatial sum = {lw_add(lw_scale(s, a.linear), b.linear), lw_add(lw_scale(s, a.angular), b.angular)};
     return sum;
 }
 
 /* ---- the body itself ---- */
 
-static lw_sym3 sym_add(lw_sym3 a, lw_sym3 b) {
+LW_INLINE lw_sym3 sym_add(lw_sym3 a, lw_sym3 b) {
     lw_sym3 s = {a.xx + b.xx, a.yy + b.yy, a.zz + b.zz, a.xy + b.xy, a.xz + b.xz, a.yz + b.yz};
     return s;
 }
@@ -51,26 +50,24 @@ static lw_inertia6 rotate_inertia(lw_mat3 r, lw_inertia6 body) {
 static void start(lw_link *l, lw_vec3 gravity, const double *wrench) {
     lw_sym3 inertia = lw_rotate_sym(l->rotation, l->inertia);
     lw_vec3 w = l->velocity.angular;
-    lw_inertia6 *own = &l->articulated;
-    *own = massless;
-    own->m.xx = own->m.yy = own->m.zz = l->mass;
-    own->j = inertia;
+    lw_inertia6 own = {{l->mass, l->mass, l->mass, 0.0, 0.0, 0.0}, inertia, no_coupling};
     if (l->added) {
         lw_inertia6 added = rotate_inertia(l->rotation, added_blocks(l->added));
-        own->m = sym_add(own->m, added.m);
-        own->j = sym_add(own->j, added.j);
-        own->h = added.h;
+        own.m = sym_add(own.m, added.m);
+        own.j = sym_add(own.j, added.j);
+        own.h = added.h;
     }
+    l->articulated = own;
     l->bias_force.linear = lw_neg(lw_add(lw_scale(l->mass, gravity), lw_load3(wrench)));
     l->bias_force.angular = lw_sub(lw_cross(w, lw_sym_vec(inertia, w)), lw_load3(wrench + 3));
-    l->mass_scale = own->m.xx + own->m.yy + own->m.zz;
-    l->inertia_scale = own->j.xx + own->j.yy + own->j.zz;
+    l->mass_scale = own.m.xx + own.m.yy + own.m.zz;
+    l->inertia_scale = own.j.xx + own.j.yy + own.j.zz;
 }
 
 /* ---- from the leaves to the roots ---- */
 
 /* i minus u uᵀ / d: what is left to move once the joint gives way along one column. */
-static void give_way(lw_inertia6 *i, lw_spatial u, double inverse) {
+LW_INLINE void give_way(lw_inertia6 *i, lw_spatial u, double inverse) {
     lw_vec3 f = lw_scale(inverse, u.linear), n = lw_scale(inverse, u.angular);
     lw_vec3 a = u.linear, b = u.angular;
     i->m.xx -= f.x * a.x, i->m.yy -= f.y * a.y, i->m.zz -= f.z * a.z;
@@ -82,13 +79,13 @@ static void give_way(lw_inertia6 *i, lw_spatial u, double inverse) {
     i->h.zx -= f.z * b.x, i->h.zy -= f.z * b.y, i->h.zz -= f.z * b.z;
 }
 
-static lw_spatial translation_force(const lw_inertia6 *i, lw_vec3 direction) {
+LW_INLINE lw_spatial translation_force(const lw_inertia6 *i, lw_vec3 direction) {
     lw_spatial f = {lw_sym_vec(i->m, direction), lw_mat_tvec(i->h, direction)};
     return f;
 }
 
 /* Eliminate the joint's columns from inertia and force. */
-static int eliminate(lw_link *l, lw_inertia6 *i, lw_spatial *f, const double *joint_force) {
+LW_INLINE int eliminate(lw_link *l, lw_inertia6 *i, lw_spatial *f, const double *joint_force) {
     for (int k = 0; k < l->columns; ++k) {
         lw_column *c = &l->column[k];
         int slides = k < l->translations;
@@ -106,23 +103,17 @@ static int eliminate(lw_link *l, lw_inertia6 *i, lw_spatial *f, const double *jo
     return LW_OK;
 }
 
-static lw_vec3 row_x(lw_mat3 m) { return lw_vec(m.xx, m.xy, m.xz); }
-static lw_vec3 row_y(lw_mat3 m) { return lw_vec(m.yx, m.yy, m.yz); }
-static lw_vec3 row_z(lw_mat3 m) { return lw_vec(m.zx, m.zy, m.zz); }
-static lw_vec3 column_x(lw_mat3 m) { return lw_vec(m.xx, m.yx, m.zx); }
-static lw_vec3 column_y(lw_mat3 m) { return lw_vec(m.xy, m.yy, m.zy); }
-static lw_vec3 column_z(lw_mat3 m) { return lw_vec(m.xz, m.yz, m.zz); }
-
 /* Add inertia and force to the parent, moved from the child's COM to the parent's: the child's
  * acceleration is a + α x r, its force has the moment r x f. */
-static void add_to_parent(lw_link *parent, const lw_inertia6 *i, lw_spatial f, lw_vec3 r) {
+LW_INLINE void add_to_parent(lw_link *parent, const lw_inertia6 *i, lw_spatial f, lw_vec3 r) {
     lw_inertia6 *p = &parent->articulated;
-    lw_vec3 hx = lw_add(row_x(i->h), lw_cross(r, lw_vec(i->m.xx, i->m.xy, i->m.xz)));
-    lw_vec3 hy = lw_add(row_y(i->h), lw_cross(r, lw_vec(i->m.xy, i->m.yy, i->m.yz)));
-    lw_vec3 hz = lw_add(row_z(i->h), lw_cross(r, lw_vec(i->m.xz, i->m.yz, i->m.zz)));
+    lw_vec3 hx = lw_add(lw_row_x(i->h), lw_cross(r, lw_vec(i->m.xx, i->m.xy, i->m.xz)));
+    lw_vec3 hy = lw_add(lw_row_y(i->h), lw_cross(r, lw_vec(i->m.xy, i->m.yy, i->m.yz)));
+    lw_vec3 hz = lw_add(lw_row_z(i->h), lw_cross(r, lw_vec(i->m.xz, i->m.yz, i->m.zz)));
     lw_mat3 h = {hx.x, hx.y, hx.z, hy.x, hy.y, hy.z, hz.x, hz.y, hz.z};
-    lw_vec3 ax = lw_cross(r, column_x(i->h)), ay = lw_cross(r, column_y(i->h)), az = lw_cross(r, column_z(i->h));
-    lw_vec3 bx = lw_cross(r, column_x(h)), by = lw_cross(r, column_y(h)), bz = lw_cross(r, column_z(h));
+    lw_vec3 ax = lw_cross(r, lw_column_x(i->h)), bx = lw_cross(r, lw_column_x(h));
+    lw_vec3 ay = lw_cross(r, lw_column_y(i->h)), by = lw_cross(r, lw_column_y(h));
+    lw_vec3 az = lw_cross(r, lw_column_z(i->h)), bz = lw_cross(r, lw_column_z(h));
     lw_sym3 j = {i->j.xx + (bx.x + ax.x), i->j.yy + (by.y + ay.y), i->j.zz + (bz.z + az.z),
                  i->j.xy + (by.x + ax.y), i->j.xz + (bz.x + ax.z), i->j.yz + (bz.y + ay.z)};
     p->m = sym_add(p->m, i->m);
@@ -136,10 +127,10 @@ static void add_to_parent(lw_link *parent, const lw_inertia6 *i, lw_spatial f, l
 }
 
 static int inward(lw_multibody *mb, lw_link *l, const double *q, const double *v) {
-    double joint_force[6];
+    double joint_force[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
     lw_inertia6 inertia = l->articulated;
     lw_spatial force = l->bias_force;
-    lw_joint_force(mb, l, q, v, joint_force);
+    if (l->sprung || l->damped) lw_joint_force(mb, l, q, v, joint_force);
     int status = eliminate(l, &inertia, &force, joint_force);
     if (status || l->parent < 0) return status;
     lw_link *parent = &mb->link[l->parent];

@@ -6,42 +6,42 @@ static const lw_mat3 identity = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
 static const lw_vec3 zero = {0.0, 0.0, 0.0};
 
 /* Joint frame on the parent: its axes in W. */
-static lw_mat3 parent_frame(const lw_link *l, const lw_link *parent) {
+LW_INLINE lw_mat3 parent_frame(const lw_link *l, const lw_link *parent) {
     if (!parent) return l->parent_matrix;
     return l->parent_rotated ? lw_mat_mul(parent->rotation, l->parent_matrix) : parent->rotation;
 }
 
-static lw_vec3 parent_frame_z(const lw_link *l, const lw_link *parent) {
+LW_INLINE lw_vec3 parent_frame_z(const lw_link *l, const lw_link *parent) {
     return parent ? lw_mat_vec(parent->rotation, l->axis) : l->axis;
 }
 
-static lw_quat parent_frame_quat(const lw_link *l, const lw_link *parent) {
+LW_INLINE lw_quat parent_frame_quat(const lw_link *l, const lw_link *parent) {
     if (!parent) return l->parent_rotated ? l->parent_quat : no_rotation;
     return l->parent_rotated ? lw_quat_mul(parent->orientation, l->parent_quat) : parent->orientation;
 }
 
-static void set_translations(lw_link *l, lw_mat3 frame) {
-    l->column[0].s.linear = lw_vec(frame.xx, frame.yx, frame.zx);
-    l->column[1].s.linear = lw_vec(frame.xy, frame.yy, frame.zy);
-    if (l->translations == 3) l->column[2].s.linear = lw_vec(frame.xz, frame.yz, frame.zz);
+LW_INLINE void set_translations(lw_link *l, lw_mat3 frame) {
+    l->column[0].s.linear = lw_column_x(frame);
+    l->column[1].s.linear = lw_column_y(frame);
+    if (l->translations == 3) l->column[2].s.linear = lw_column_z(frame);
 }
 
 /* Rotation axes of spherical and free joints are those of the child-side joint frame. */
-static void set_rotations(lw_link *l) {
+LW_INLINE void set_rotations(lw_link *l) {
     lw_mat3 frame = l->child_rotated ? lw_mat_mul(l->rotation, l->child_matrix) : l->rotation;
     lw_column *c = l->column + l->translations;
-    c[0].s.angular = lw_vec(frame.xx, frame.yx, frame.zx);
-    c[1].s.angular = lw_vec(frame.xy, frame.yy, frame.zy);
-    c[2].s.angular = lw_vec(frame.xz, frame.yz, frame.zz);
+    c[0].s.angular = lw_column_x(frame);
+    c[1].s.angular = lw_column_y(frame);
+    c[2].s.angular = lw_column_z(frame);
 }
 
-static void orient(lw_link *l, lw_quat joint_frame) {
+LW_INLINE void orient(lw_link *l, lw_quat joint_frame) {
     l->orientation = l->child_rotated ? lw_quat_mul(joint_frame, l->child_quat_inverse) : joint_frame;
     l->rotation = lw_quat_matrix(l->orientation);
 }
 
 /* Set the rotation and the motion vectors (but for the lever arms); return the joint's translation. */
-static lw_vec3 turn(lw_link *l, const lw_link *parent, const double *q) {
+LW_INLINE lw_vec3 turn(lw_link *l, const lw_link *parent, const double *q) {
     lw_quat frame = parent_frame_quat(l, parent);
     lw_mat3 axes;
     switch (l->type) {
@@ -57,7 +57,7 @@ static lw_vec3 turn(lw_link *l, const lw_link *parent, const double *q) {
         orient(l, lw_quat_mul_z(frame, cos(0.5 * q[2]), sin(0.5 * q[2])));
         axes = parent_frame(l, parent);
         set_translations(l, axes);
-        l->column[2].s.angular = lw_mat_column_z(axes);
+        l->column[2].s.angular = lw_column_z(axes);
         return lw_mat_vec(axes, lw_vec(q[0], q[1], 0.0));
     case LW_SPHERICAL:
         orient(l, lw_quat_mul(frame, lw_quat_unit(lw_load4(q))));
@@ -76,7 +76,7 @@ static lw_vec3 turn(lw_link *l, const lw_link *parent, const double *q) {
 }
 
 /* Set pose and motion vectors from the joint's coordinates. */
-static void place(lw_link *l, const lw_link *parent, const double *q) {
+LW_INLINE void place(lw_link *l, const lw_link *parent, const double *q) {
     lw_vec3 slide = turn(l, parent, q);
     lw_vec3 hold = parent ? lw_mat_vec(parent->rotation, l->parent_point) : l->parent_point;
     l->arm = lw_neg(lw_mat_vec(l->rotation, l->child_point));
@@ -87,7 +87,7 @@ static void place(lw_link *l, const lw_link *parent, const double *q) {
 }
 
 /* Set velocity and bias acceleration. */
-static void move(lw_link *l, const lw_link *parent, const double *v) {
+LW_INLINE void move(lw_link *l, const lw_link *parent, const double *v) {
     lw_vec3 slide = zero, turning = zero;
     for (int k = 0; k < l->translations; ++k)
         slide = lw_add(slide, lw_scale(v[k], l->column[k].s.linear));

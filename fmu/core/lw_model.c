@@ -7,7 +7,8 @@
 static size_t vector_length(int32_t nq, int32_t nv) { return (size_t)nq + (size_t)nv + 2; }
 
 size_t lw_multibody_size(int32_t n, int32_t nq, int32_t nv) {
-    size_t doubles = 6 * (size_t)n + 2 * (size_t)nv + (size_t)nq + (2 + LW_MAX_STAGES) * vector_length(nq, nv);
+    size_t doubles = 6 * (size_t)n + 2 * (size_t)nv + (size_t)nq;
+    doubles += (2 + LW_MAX_STAGES) * vector_length(nq, nv);
     return sizeof(lw_multibody) + (size_t)n * sizeof(lw_link) + doubles * sizeof(double);
 }
 
@@ -60,7 +61,7 @@ static void build_frames(lw_link *l, const lw_tables *t, int i) {
     l->child_rotated = !is_identity(t->child_rotation + 9 * i);
     l->parent_quat = matrix_quat(lw_load9(t->parent_rotation + 9 * i));
     l->parent_matrix = lw_quat_matrix(l->parent_quat);
-    l->axis = lw_mat_column_z(l->parent_matrix);
+    l->axis = lw_column_z(l->parent_matrix);
     lw_quat child = matrix_quat(lw_load9(t->child_rotation + 9 * i));
     l->child_quat_inverse = lw_quat_conj(child);
     l->child_matrix = lw_quat_matrix(child);
