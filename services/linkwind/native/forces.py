@@ -6,7 +6,7 @@ constants. Motions and wrenches cross as structs of addresses, bound once for ea
 
 from __future__ import annotations
 
-import ctypes  # noqa: TID251 - native/ is the one place
+import ctypes
 import enum
 from dataclasses import dataclass
 from typing import Any
