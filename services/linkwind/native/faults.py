@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes  # noqa: TID251 - native/ is the one place
+import ctypes
 from typing import Any, NoReturn
 
 from linkwind.errors import SimulationError

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes  # noqa: TID251 - native/ is the one place
+import ctypes
 import functools
 from collections.abc import Callable, Sequence
 from importlib.resources import files

@@ -6,7 +6,7 @@ world axes at the centres of mass, and body i is carried by joint i.
 
 from __future__ import annotations
 
-import ctypes  # noqa: TID251 - native/ is the one place
+import ctypes
 import enum
 import struct
 from typing import Any, NamedTuple
