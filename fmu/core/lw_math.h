@@ -8,10 +8,13 @@
 
 #include <math.h>
 
+/* An FMU defines it as nothing: it exports its interface only. */
+#ifndef LW_API
 #if defined(_WIN32)
 #define LW_API __declspec(dllexport)
 #else
 #define LW_API __attribute__((visibility("default")))
+#endif
 #endif
 
 /* Struct arguments of a call go through memory: inlined they stay in registers (15 % of the run time). */
