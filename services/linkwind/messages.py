@@ -25,12 +25,13 @@ def _zeros(count: int) -> list[float]:
 class _Message:
     """A message of fixed layout with the scalars that every exchange carries."""
 
-    __slots__ = ("_layout", "_name", "_scalars")
+    __slots__ = ("_iteration", "_layout", "_name", "_step", "_time_ns")
 
     def __init__(self, name: str, **fields: object) -> None:
         self._name = name
         self._layout = FixedLayout(MESSAGES[name](**fields))
-        self._scalars = self._layout.views
+        views = self._layout.views
+        self._step, self._iteration, self._time_ns = views["step"], views["iteration"], views["time_ns"]
 
     def payload(self) -> bytes:
         """Return the encoded message."""
@@ -56,24 +57,19 @@ class _Message:
 
     def stamp(self, step: int, iteration: int, time_ns: int) -> None:
         """Set which exchange this message belongs to."""
-        self._scalars["step"][0] = step
-        self._scalars["iteration"][0] = iteration
-        self._scalars["time_ns"][0] = time_ns
+        self._step[0] = step
+        self._iteration[0] = iteration
+        self._time_ns[0] = time_ns
 
     @property
-    def step(self) -> int:
-        """Index of the communication point."""
-        return int(self._scalars["step"][0])
-
-    @property
-    def iteration(self) -> int:
-        """Coupling iteration, from 0."""
-        return int(self._scalars["iteration"][0])
+    def at(self) -> tuple[int, int]:
+        """Which exchange this message belongs to: index of the communication point, coupling iteration."""
+        return self._step.item(), self._iteration.item()
 
     @property
     def time_ns(self) -> int:
         """Simulation time of the communication point [ns]."""
-        return int(self._scalars["time_ns"][0])
+        return int(self._time_ns.item())
 
 
 class MotionMessage(_Message):
@@ -117,11 +113,11 @@ class MotionMessage(_Message):
     @property
     def final(self) -> bool:
         """Whether the run is over: ``accepted`` is the last state, nothing is to be evaluated."""
-        return bool(self._scalars["final"][0])
+        return bool(self._layout.views["final"][0])
 
     @final.setter
     def final(self, value: bool) -> None:
-        self._scalars["final"][0] = int(value)
+        self._layout.views["final"][0] = int(value)
 
 
 class WrenchMessage(_Message):

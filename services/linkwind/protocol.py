@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import uuid
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Any, Protocol
 
@@ -198,7 +198,7 @@ class ProviderSession:
         """
         motion = self._motion
         motion.load(payload, f'"{self.name}": motion')
-        at = (motion.step, motion.iteration)
+        at = motion.at
         if motion.final:
             self._model.commit(motion.time_ns / 1e9, motion.accepted)
             self.state = ProviderState.DONE
@@ -242,7 +242,7 @@ class ProviderSession:
 
     def fault(self, error: BaseException) -> bytes:
         """Return the message that tells the others that this provider cannot go on."""
-        step, iteration = (self._motion.step, self._motion.iteration) if self.run else (0, 0)
+        step, iteration = self._motion.at if self.run else (0, 0)
         return fault(self.name, step, iteration, error)
 
 
@@ -260,7 +260,12 @@ class _Participant:
     message: WrenchMessage | None = None
     diagnostics: tuple[str, ...] = ()
     kind: str = "point"
-    bodies_index: Array | slice = field(default_factory=lambda: slice(None))
+
+    @property
+    def answer(self) -> Wrench:
+        """Its last answer."""
+        assert self.message is not None
+        return self.message.wrench
 
 
 class DynamicsSession:
@@ -304,13 +309,10 @@ class DynamicsSession:
         self._force, self._torque = self._wrench[:, :3], self._wrench[:, 3:]
         self._added = self._numbers[6 * n :].reshape(n, 6, 6)
         self._has_added = False
+        self._alone: Wrench | None = None  # the one answer that is the total, where there is only one
         index = {name: i for i, name in enumerate(bodies)}
         self._participants = {
-            name: _Participant(
-                name,
-                tuple(index[b] for b in on),
-                bodies_index=_body_index([index[b] for b in on], len(bodies)),
-            )
+            name: _Participant(name, tuple(index[b] for b in on))
             for name, on in providers.items()
         }
 
@@ -373,6 +375,8 @@ class DynamicsSession:
         )
         known.ready = True
         self._has_added |= ready.added_inertia
+        if len(self._participants) == 1 and known.bodies == tuple(range(len(self.bodies))):
+            self._alone = known.answer
         return Control(start={})
 
     def _on_bye(self, message: Any) -> Any:
@@ -419,7 +423,7 @@ class DynamicsSession:
 
     def where(self) -> str:
         """Return the step and time of the last motion, for an error."""
-        return f"step {self.motion.step} (t = {self.motion.time_ns / 1e9:g} s)"
+        return f"step {self.motion.at[0]} (t = {self.motion.time_ns / 1e9:g} s)"
 
     def post(self, step: int, iteration: int, *, final: bool = False) -> bytes:
         """Stamp the motion message and return it encoded."""
@@ -443,7 +447,7 @@ class DynamicsSession:
             raise ProtocolError(f'wrench from "{provider}": it does not take part in run {self.run}')
         message = known.message
         message.load(payload, f'wrench from "{provider}"')
-        at, asked = (message.step, message.iteration), (self.motion.step, self.motion.iteration)
+        at, asked = message.at, self.motion.at
         if at < asked or (at == asked and known.answered):
             if known.answered:
                 message.load(known.payload, "its answer")  # the arrays keep what was accepted
@@ -468,16 +472,19 @@ class DynamicsSession:
         Raises:
             SimulationError: a number is not finite.
         """
-        self._wrench.fill(0.0)
-        if self._has_added:
-            self._added.fill(0.0)
-        for p in self._participants.values():
-            assert p.message is not None
-            part = p.message.wrench
-            self._force[p.bodies_index] += part.force
-            self._torque[p.bodies_index] += part.torque
-            if part.added_inertia is not None:
-                self._added[p.bodies_index] += part.added_inertia
+        if self._alone is not None:  # the usual case, on the path that everybody waits for
+            np.copyto(self._force, self._alone.force)
+            np.copyto(self._torque, self._alone.torque)
+            if self._alone.added_inertia is not None:
+                np.copyto(self._added, self._alone.added_inertia)
+        else:
+            self._numbers.fill(0.0)
+            for p in self._participants.values():
+                rows, part = list(p.bodies), p.answer
+                self._force[rows] += part.force
+                self._torque[rows] += part.torque
+                if part.added_inertia is not None:
+                    self._added[rows] += part.added_inertia
         self._check_finite()
         return self._wrench, self._added if self._has_added else None
 
@@ -486,8 +493,7 @@ class DynamicsSession:
         if np.isfinite(self._numbers).all():
             return
         for p in self._participants.values():
-            assert p.message is not None
-            part = p.message.wrench
+            part = p.answer
             arrays = {"force": part.force, "torque": part.torque, "added inertia": part.added_inertia}
             for name, array in arrays.items():
                 if array is not None and not np.isfinite(array).all():
@@ -497,9 +503,3 @@ class DynamicsSession:
                         f"numbers; got {array[row].ravel().tolist()}"
                     )
 
-
-def _body_index(on: list[int], n: int) -> Any:
-    """Return an index of the bodies ``on``: a slice where it can be one, which numpy does faster."""
-    if on == list(range(n)):
-        return slice(None)
-    return np.array(on)

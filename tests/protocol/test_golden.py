@@ -83,7 +83,7 @@ def test_motion_is_written_and_read_as_the_golden_bytes(name: str) -> None:
     assert written.payload() == encoded
     read = MotionMessage("golden", 2)
     read.load(encoded, "golden")
-    assert (read.step, read.iteration, read.time_ns, read.final) == (
+    assert (*read.at, read.time_ns, read.final) == (
         120,
         1,
         120_000_000,

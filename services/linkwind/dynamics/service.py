@@ -98,7 +98,7 @@ class DynamicsService:
             wall = time.perf_counter() - start
             self._say_goodbye(final, poll)
         except BaseException as error:
-            link.fault(fault("dynamics", self.session.motion.step, self.session.motion.iteration, error))
+            link.fault(fault("dynamics", *self.session.motion.at, error))
             raise
         return Result(
             steps=self._scenario.steps,

@@ -66,6 +66,7 @@ _energy = declare("lw_multibody_energy", [_pointer] * 4, None)
 _joint_gap = declare("lw_multibody_joint_gap", [_pointer] * 3, _double)
 _repeat = declare("lw_multibody_repeat", [_pointer, _pointer, _int])
 # lw_macro_step: packing all of it at once is several times faster than converting fourteen arguments.
+KNOWN_ARRAYS = 32  # whose addresses are remembered
 _macro_step = struct.Struct("@PdPPPddiiiPPP")
 
 
@@ -97,9 +98,13 @@ class Multibody:
         self._work, self._energies, self._fault = np.zeros(2), np.zeros(2), Fault()
         buffers = (self._memory, self._state, self._next, self._work, self._energies)
         self._model, self._state_at, self._next_at, self._work_at, self._energies_at = map(address, buffers)
+        # joint accelerations, then three rows of six for every body
+        self._results = np.zeros(self.nv + 18 * self.n)
+        first = address(self._results)
+        self._results_at = [first + 8 * (self.nv if i else 0) + 48 * self.n * max(0, i - 1) for i in range(4)]
         self._step = ctypes.create_string_buffer(_macro_step.size)
         self._fault_at, self._step_at = ctypes.addressof(self._fault), ctypes.addressof(self._step)
-        self._seen: list[tuple[Any, int]] = [(None, 0)] * 3
+        self._known: dict[int, tuple[Array, int]] = {}
         pointers = {name: array.ctypes.data for name, array in arrays.items()}
         native = CTables(n=self.n, nq=self.nq, nv=self.nv, **pointers)
         if status := _init(self._model, ctypes.addressof(native), self._fault_at):
@@ -171,7 +176,7 @@ class Multibody:
         if wrenches.shape != (count, self.n, 6):
             self._refuse("wrenches", (count, self.n, 6), wrenches)
         _macro_step.pack_into(
-            self._step, 0, self._state_at, h, self._locate(0, nodes), self._locate(1, wrenches),
+            self._step, 0, self._state_at, h, self._locate(nodes), self._locate(wrenches),
             self._locate_added(added_inertia), rtol, atol, count, integrator, substeps,
             self._next_at, self._work_at, self._fault_at,
         )  # fmt: skip
@@ -198,15 +203,15 @@ class Multibody:
         self._take(state)
         if wrench.shape != (self.n, 6):
             self._refuse("wrench", (self.n, 6), wrench)
-        bodies = (self.n, 6)
-        result = Evaluation(np.zeros(self.nv), np.zeros(bodies), np.zeros(bodies), np.zeros(bodies))
         status = _evaluate(
-            self._model, self._state_at, self._locate(1, wrench), self._locate_added(added_inertia),
-            *map(address, result), self._fault_at,
+            self._model, self._state_at, self._locate(wrench), self._locate_added(added_inertia),
+            *self._results_at, self._fault_at,
         )  # fmt: skip
         if status:
             fail(status, self._fault, {})
-        return result
+        result, nv, n = self._results.copy(), self.nv, self.n
+        bodies = result[nv:].reshape(3, n, 6)
+        return Evaluation(result[:nv], bodies[0], bodies[1], bodies[2])
 
     def energy(self, state: Array) -> tuple[float, float]:
         """Return kinetic and potential energy [J]: gravity from the origin of W, springs from rest."""
@@ -233,20 +238,21 @@ class Multibody:
             self._refuse("state", self._state.shape, state)
         self._state[:] = state
 
-    def _locate(self, slot: int, array: Array) -> int:
+    def _locate(self, array: Array) -> int:
         """Return an array's address; looked up once for an array that comes again and again."""
-        seen, at = self._seen[slot]
-        if seen is not array:
-            at = address(array)
-            self._seen[slot] = (array, at)
-        return at
+        known = self._known.get(id(array))
+        if known is None:
+            if len(self._known) == KNOWN_ARRAYS:
+                self._known.clear()
+            known = self._known[id(array)] = (array, address(array))  # kept alive, so that the id stays its own
+        return known[1]
 
     def _locate_added(self, added_inertia: Array | None) -> int:
         if added_inertia is None:
             return 0
         if added_inertia.shape != (self.n, 6, 6):
             self._refuse("added_inertia", (self.n, 6, 6), added_inertia)
-        return self._locate(2, added_inertia)
+        return self._locate(added_inertia)
 
     @staticmethod
     def _refuse(name: str, shape: tuple[int, ...], array: Array) -> None:
