@@ -312,8 +312,7 @@ class DynamicsSession:
         self._alone: Wrench | None = None  # the one answer that is the total, where there is only one
         index = {name: i for i, name in enumerate(bodies)}
         self._participants = {
-            name: _Participant(name, tuple(index[b] for b in on))
-            for name, on in providers.items()
+            name: _Participant(name, tuple(index[b] for b in on)) for name, on in providers.items()
         }
 
     # --- hand-shake -------------------------------------------------------------------------------
@@ -338,7 +337,8 @@ class DynamicsSession:
         if hello.schema_sha256 != SHA256:
             reason = (
                 f'participant "{hello.name}": expected schema {SHA256[:12]} (linkwind {__version__}); got '
-                f"{hello.schema_sha256[:12]} (linkwind {hello.version}). Install the same version on both sides."
+                f"{hello.schema_sha256[:12]} (linkwind {hello.version}). Install the same version on both "
+                "sides."
             )
             self.failure = RefusedError(reason)
             raise self.failure
@@ -499,7 +499,6 @@ class DynamicsSession:
                 if array is not None and not np.isfinite(array).all():
                     row = int(np.argwhere(~np.isfinite(array))[0][0])
                     raise SimulationError(
-                        f'"{p.name}": {self.where()}: {name} on {self.bodies[p.bodies[row]]}: expected finite '
-                        f"numbers; got {array[row].ravel().tolist()}"
+                        f'"{p.name}": {self.where()}: {name} on {self.bodies[p.bodies[row]]}: expected '
+                        f"finite numbers; got {array[row].ravel().tolist()}"
                     )
-

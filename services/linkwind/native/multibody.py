@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import enum
 import struct
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -244,7 +244,7 @@ class Multibody:
         if known is None:
             if len(self._known) == KNOWN_ARRAYS:
                 self._known.clear()
-            known = self._known[id(array)] = (array, address(array))  # kept alive, so that the id stays its own
+            known = self._known[id(array)] = (array, address(array))  # kept alive: the id stays its own
         return known[1]
 
     def _locate_added(self, added_inertia: Array | None) -> int:
