@@ -218,7 +218,9 @@ def test_wrench_that_is_not_finite_names_provider_body_and_step(bad: float, wher
     model.poison = (where, 1, bad)
     exchange(d, p, 1)
     name = where.replace("_", " ")
-    with pytest.raises(SimulationError, match=rf'"aero": step 1 \(t = 0.001 s\): {name} on b: expected finite'):
+    with pytest.raises(
+        SimulationError, match=rf'"aero": step 1 \(t = 0.001 s\): {name} on b: expected finite'
+    ):
         d.total()
 
 

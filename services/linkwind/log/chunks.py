@@ -13,10 +13,10 @@ from io import BytesIO
 from mmap import mmap
 from typing import Any, NamedTuple
 
-from mcap.data_stream import ReadDataStream  # noqa: TID251 - log/ is the one place
-from mcap.opcode import Opcode  # noqa: TID251
-from mcap.records import Channel, Chunk, Schema  # noqa: TID251
-from mcap.stream_reader import get_chunk_data_stream  # noqa: TID251
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, Schema
+from mcap.stream_reader import get_chunk_data_stream
 
 MAGIC = b"\x89MCAP0\r\n"
 OPCODES = frozenset(int(opcode) for opcode in Opcode)

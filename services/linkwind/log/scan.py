@@ -11,8 +11,8 @@ import zlib
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from mcap.opcode import Opcode  # noqa: TID251 - log/ is the one place
-from mcap.records import Attachment, DataEnd, Footer, Header, Metadata, Statistics  # noqa: TID251
+from mcap.opcode import Opcode
+from mcap.records import Attachment, DataEnd, Footer, Header, Metadata, Statistics
 
 from linkwind.log.chunks import (
     MAGIC,

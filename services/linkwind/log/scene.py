@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from foxglove.messages import (  # noqa: TID251 - log/ is the one place
+from foxglove.messages import (
     ArrowPrimitive,
     Color,
     CubePrimitive,

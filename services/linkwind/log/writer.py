@@ -15,9 +15,9 @@ from time import monotonic
 from types import TracebackType
 from typing import Any
 
-from foxglove import Channel, Context, Schema, open_mcap  # noqa: TID251 - log/ is the one place
-from foxglove.channels import FrameTransformsChannel, SceneUpdateChannel  # noqa: TID251
-from foxglove.mcap import MCAPWriteOptions  # noqa: TID251
+from foxglove import Channel, Context, Schema, open_mcap
+from foxglove.channels import FrameTransformsChannel, SceneUpdateChannel
+from foxglove.mcap import MCAPWriteOptions
 
 from linkwind import schema
 from linkwind.errors import LogError
