@@ -20,8 +20,10 @@ try:
 except ImportError:  # run by hand: ``python fmu/hatch_build.py`` rebuilds the library in place
     BuildHookInterface = object  # type: ignore[assignment,misc]
 
-# No fast-math and no contraction: the same bits from gcc, clang and zig (see fmu/README.md).
-FLAGS = ["-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fPIC", "-fvisibility=hidden"]
+# No fast-math and no contraction: the same bits from gcc, clang and zig (see fmu/README.md). The file
+# travels with the package, which compiles FMUs with the same flags.
+FLAGS_FILE = Path(__file__).with_name("flags.txt")
+FLAGS = FLAGS_FILE.read_text(encoding="utf-8").split()
 WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Wno-sign-conversion"]
 
 
@@ -45,9 +47,7 @@ def compile_library(root: Path, target: Path) -> None:
     includes = [f"-I{root / 'fmu' / 'core'}", f"-I{root / 'fmu' / 'aero'}"]
     partial = target.with_name(target.name + ".partial")
     command = [*compiler(), *FLAGS, *WARNINGS, *includes, "-shared", "-o", str(partial)]
-    done = subprocess.run(
-        [*command, *map(str, sources), "-lm"], capture_output=True, text=True, check=False
-    )
+    done = subprocess.run([*command, *map(str, sources), "-lm"], capture_output=True, text=True, check=False)
     if done.returncode:
         raise RuntimeError(f"compiling the core failed:\n{' '.join(command)}\n{done.stderr}")
     if done.stderr:
@@ -59,11 +59,12 @@ def build_data(root: Path) -> None:
     """Fill ``services/linkwind/_data`` with the library, the C sources and the schemas."""
     data = root / "services" / "linkwind" / "_data"
     data.mkdir(exist_ok=True)
-    for folder in ("core", "aero"):
+    for folder in ("core", "aero", "fmi"):
         shutil.rmtree(data / "fmu" / folder, ignore_errors=True)
         shutil.copytree(
             root / "fmu" / folder, data / "fmu" / folder, ignore=shutil.ignore_patterns("__pycache__")
         )
+    shutil.copy(FLAGS_FILE, data / "fmu")
     shutil.rmtree(data / "schemas", ignore_errors=True)
     shutil.copytree(root / "schemas", data / "schemas")
     compile_library(root, data / "liblinkwind.so")
