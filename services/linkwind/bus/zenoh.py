@@ -210,8 +210,8 @@ class ZenohDynamicsLink(_Endpoint):
         if not present and name in self._exchanging.not_gone:
             self._fail(
                 LostError(
-                    f'"{name}" was lost at {self._exchanging.where()}: its process ended, was stopped for more '
-                    f"than {LEASE:g} s, or the network was cut. Look at its output"
+                    f'"{name}" was lost at {self._exchanging.where()}: its process ended, was stopped for '
+                    f"more than {LEASE:g} s, or the network was cut. Look at its output"
                 )
             )
 
