@@ -1,0 +1,179 @@
+/* A force model: motion in, wrench and added inertia out. */
+#include <math.h>
+#include <string.h>
+
+#include "lw_field.h"
+#include "lw_part.h"
+#include "lw_plate.h"
+
+enum { WRENCH = 1 }; /* the one group */
+
+struct lw_part {
+    uint32_t first[LW_AERO_SECTIONS + 1];
+    lw_plates plates;
+    lw_field field;
+    double *size;  /* (n, 2) chord and span [m] */
+    int32_t *body; /* (n) 0 ... n - 1 */
+};
+
+/* ---- layout ---- */
+
+#define COUNT(name, size) count += (size_t)(size);
+
+size_t lw_part_known(void) {
+    int32_t n = lw_fmu_n;
+    size_t count = 0;
+    LW_AERO_KNOWN(COUNT)
+    return count;
+}
+
+size_t lw_part_values(void) {
+    int32_t n = lw_fmu_n;
+    size_t count = lw_part_known();
+    LW_AERO_CALCULATED(COUNT)
+    return count;
+}
+
+/* The field's headings. */
+size_t lw_part_memory(void) { return (size_t)lw_fmu_n; }
+
+static size_t own_size(void) { return (sizeof(lw_part) + 7) / 8 * 8; }
+
+size_t lw_part_size(void) { return own_size() + (size_t)lw_fmu_n * (2 * sizeof(double) + sizeof(double)); }
+
+void lw_part_create(lw_instance *instance) {
+    lw_part *part = instance->part;
+    int32_t n = lw_fmu_n;
+    uint32_t count = 0, *first = part->first;
+#define PLACE(name, size) *first++ = count, count += (uint32_t)(size);
+    LW_AERO_KNOWN(PLACE) LW_AERO_CALCULATED(PLACE)
+    *first = count;
+    part->size = (double *)(void *)((char *)part + own_size());
+    part->body = (int32_t *)(void *)(part->size + 2 * n);
+    for (int32_t i = 0; i < n; ++i) part->body[i] = i;
+    part->field.n = part->plates.n = n;
+    part->field.body = part->plates.body = part->body;
+    part->field.start = lw_fmu_field_start;
+    part->field.code = lw_fmu_field_code;
+    part->field.constants = lw_fmu_field_constants;
+    part->plates.coefficients = lw_fmu_coefficients;
+    part->plates.size = part->size;
+    part->plates.wind.n_gusts = lw_fmu_gust_count;
+    part->plates.wind.gusts = lw_fmu_gusts;
+}
+
+void lw_part_restart(lw_instance *instance) {
+    memcpy(instance->store, lw_fmu_theta, lw_part_memory() * sizeof(double));
+}
+
+uint32_t lw_part_first(const lw_instance *instance, unsigned section) { return instance->part->first[section]; }
+
+uint32_t lw_part_states(const lw_instance *instance) { return (void)instance, 0; }
+
+uint32_t lw_part_derivatives(const lw_instance *instance, unsigned *groups) {
+    *groups = 0;
+    return (void)instance, 0;
+}
+
+static double *section(const lw_instance *instance, unsigned number) {
+    return instance->values + instance->part->first[number];
+}
+
+/* ---- parameters ---- */
+
+static int check_sign(const lw_instance *instance, unsigned number, int zero_allowed) {
+    const uint32_t *first = instance->part->first;
+    for (uint32_t i = first[number]; i < first[number + 1]; ++i)
+        if (!(instance->values[i] > 0.0 || (zero_allowed && instance->values[i] == 0.0)))
+            return lw_report(instance, LW_FMI_ERROR, "%s: Expected %s but was %.17g.",
+                             lw_name_at(LW_TYPE_FLOAT64, i), zero_allowed ? "zero or more" : "more than zero",
+                             instance->values[i]);
+    return LW_FMI_OK;
+}
+
+int lw_part_configure(lw_instance *instance) {
+    lw_part *part = instance->part;
+    if (lw_fmu_aero_model != LW_AERO_PLATE) return LW_FMI_OK;
+    if (check_sign(instance, LW_AERO_DENSITY, 1) || check_sign(instance, LW_AERO_LENGTH, 0) ||
+        check_sign(instance, LW_AERO_SPAN, 0))
+        return LW_FMI_ERROR;
+    part->plates.density = *section(instance, LW_AERO_DENSITY);
+    memcpy(part->plates.wind.uniform, section(instance, LW_AERO_WIND), sizeof part->plates.wind.uniform);
+    for (int32_t i = 0; i < lw_fmu_n; ++i) {
+        part->size[2 * i] = section(instance, LW_AERO_LENGTH)[i];
+        part->size[2 * i + 1] = section(instance, LW_AERO_SPAN)[i];
+    }
+    return LW_FMI_OK;
+}
+
+/* ---- outputs ---- */
+
+static lw_motion motion(const lw_instance *instance) {
+    lw_motion now = {section(instance, LW_AERO_POSITION), section(instance, LW_AERO_ORIENTATION),
+                     section(instance, LW_AERO_LINEAR), section(instance, LW_AERO_ANGULAR)};
+    return now;
+}
+
+unsigned lw_part_group(unsigned number) { return (void)number, WRENCH; }
+
+int lw_part_update(lw_instance *instance, unsigned groups) {
+    const lw_part *part = instance->part;
+    lw_motion now = motion(instance);
+    lw_wrench wrench = {section(instance, LW_AERO_FORCE), section(instance, LW_AERO_TORQUE),
+                        section(instance, LW_AERO_ADDED_INERTIA)};
+    int field = lw_fmu_aero_model == LW_AERO_FIELD;
+    (void)groups;
+    int status = field ? lw_field_evaluate(&part->field, instance->time, &now, instance->store, &wrench)
+                       : lw_plates_evaluate(&part->plates, instance->time, &now, &wrench);
+    if (!status) return LW_FMI_OK;
+    int body = field ? (status - 1) / 6 : status - 1;
+    return lw_report(instance, LW_FMI_DISCARD, "Expected a finite wrench on body %d but was another at t = %.9g s.",
+                     body, instance->time);
+}
+
+int32_t lw_part_output_order(void) { return 0; }
+
+int lw_part_rate(unsigned number) { return (void)number, -1; }
+
+/* ---- steps: what was set and accepted at the start is what headings are unwrapped against ---- */
+
+int32_t lw_part_pieces(const lw_instance *instance) { return (void)instance, 1; }
+
+int lw_part_advance(lw_instance *instance, double h, int32_t pieces) {
+    (void)h, (void)pieces;
+    lw_part_accept(instance);
+    return LW_FMI_OK;
+}
+
+void lw_part_accept(lw_instance *instance) {
+    lw_motion now = motion(instance);
+    if (lw_fmu_aero_model == LW_AERO_FIELD) lw_field_commit(&instance->part->field, &now, instance->store);
+}
+
+int lw_part_set_input_derivative(lw_instance *instance, uint32_t index, int32_t order, double value) {
+    return (void)instance, (void)index, (void)order, (void)value, 0;
+}
+
+/* ---- scales of differences ---- */
+
+static double row_norm(const lw_instance *instance, unsigned number, uint32_t row, const double *less) {
+    lw_vec3 v = lw_load3(section(instance, number) + 3 * row);
+    return lw_norm(less ? lw_sub(v, lw_load3(less)) : v);
+}
+
+/* A force law turns with the direction of the air: speeds vary by what they are. */
+double lw_part_scale(const lw_instance *instance, const lw_fmu_variable *variable, uint32_t index) {
+    uint32_t place = index - instance->part->first[variable->section];
+    double scale = fabs(instance->values[index]);
+    switch (variable->section) {
+    case LW_AERO_POSITION:
+    case LW_AERO_ORIENTATION: return 1.0;
+    case LW_AERO_LINEAR:
+        scale = row_norm(instance, LW_AERO_LINEAR, place / 3, section(instance, LW_AERO_WIND));
+        break;
+    case LW_AERO_ANGULAR: scale = row_norm(instance, LW_AERO_ANGULAR, place / 3, NULL); break;
+    case LW_AERO_WIND: scale = row_norm(instance, LW_AERO_WIND, 0, NULL); break;
+    default: break;
+    }
+    return scale > 0.0 ? scale : 1.0;
+}

@@ -1,0 +1,331 @@
+/* The mechanism: wrenches in, motion out. Numbers of the core are used as they come. */
+#include <math.h>
+#include <string.h>
+
+#include "lw_model.h"
+#include "lw_part.h"
+
+enum { MAX_ORDER = 3 }; /* of input derivatives */
+enum { PROPOSED, ORDER, RATES }; /* memory: substep of dopri5 [s], order and values of input derivatives */
+enum { RATE = 1, MOTION = 2, ACCELERATION = 4, ENERGY = 8 }; /* groups */
+
+struct lw_part {
+    uint32_t first[LW_DYNAMICS_SECTIONS + 1];
+    lw_multibody *multibody;
+    double *state, *wrench, *joint, *acceleration, *reaction, *total;
+    const double *added; /* added inertia, NULL where it is zero */
+};
+
+/* ---- layout ---- */
+
+#define COUNT(name, size) count += (size_t)(size);
+
+size_t lw_part_known(void) {
+    int32_t n = lw_fmu_n, nq = lw_fmu_nq, nv = lw_fmu_nv;
+    size_t count = 0;
+    LW_DYNAMICS_KNOWN(COUNT)
+    return count;
+}
+
+size_t lw_part_values(void) {
+    int32_t n = lw_fmu_n, nq = lw_fmu_nq, nv = lw_fmu_nv;
+    size_t count = lw_part_known();
+    LW_DYNAMICS_CALCULATED(COUNT)
+    return count;
+}
+
+static size_t forces(void) { return 6 * (size_t)lw_fmu_n; }
+
+size_t lw_part_memory(void) { return RATES + MAX_ORDER * forces(); }
+
+size_t lw_part_size(void) {
+    size_t state = lw_state_size() + 1, doubles = state + (MAX_ORDER + 1 + 3) * forces() + (size_t)lw_fmu_nv;
+    return (sizeof(lw_part) + 7) / 8 * 8 + doubles * sizeof(double) +
+           (lw_multibody_size(lw_fmu_n, lw_fmu_nq, lw_fmu_nv) + 7) / 8 * 8;
+}
+
+void lw_part_create(lw_instance *instance) {
+    lw_part *part = instance->part;
+    int32_t n = lw_fmu_n, nq = lw_fmu_nq, nv = lw_fmu_nv;
+    uint32_t count = 0, *first = part->first;
+#define PLACE(name, size) *first++ = count, count += (uint32_t)(size);
+    LW_DYNAMICS_KNOWN(PLACE) LW_DYNAMICS_CALCULATED(PLACE)
+    *first = count;
+    double *next = (double *)(void *)((char *)part + (sizeof *part + 7) / 8 * 8);
+    part->state = next, next += lw_state_size() + 1;
+    part->wrench = next, next += (MAX_ORDER + 1) * forces();
+    part->acceleration = next, next += forces();
+    part->reaction = next, next += forces();
+    part->total = next, next += forces();
+    part->joint = next, next += lw_fmu_nv;
+    part->multibody = (lw_multibody *)(void *)next;
+}
+
+void lw_part_restart(lw_instance *instance) { memset(instance->store, 0, lw_part_memory() * sizeof(double)); }
+
+uint32_t lw_part_first(const lw_instance *instance, unsigned section) { return instance->part->first[section]; }
+
+uint32_t lw_part_states(const lw_instance *instance) { return instance->part->first[LW_DYNAMICS_Q]; }
+
+uint32_t lw_part_derivatives(const lw_instance *instance, unsigned *groups) {
+    *groups = RATE | ACCELERATION;
+    return instance->part->first[LW_DYNAMICS_DER_Q];
+}
+
+static double *section(const lw_instance *instance, unsigned number) {
+    return instance->values + instance->part->first[number];
+}
+
+/* ---- parameters ---- */
+
+static int refuse(const lw_instance *instance, uint32_t index, const char *expected) {
+    return lw_report(instance, LW_FMI_ERROR, "%s: Expected %s but was %.17g.", lw_name_at(LW_TYPE_FLOAT64, index),
+                     expected, instance->values[index]);
+}
+
+/* Name the parameter that the core objects to. */
+static int refuse_table(const lw_instance *instance, int status, const lw_fault *fault) {
+    const uint32_t *first = instance->part->first, row = (uint32_t)fault->item;
+    if (status == LW_BAD_MASS) return refuse(instance, first[LW_DYNAMICS_MASS] + row, "a mass of zero or more");
+    if (status == LW_BAD_INERTIA) {
+        uint32_t index = first[LW_DYNAMICS_INERTIA] + 6 * row;
+        for (int k = 0; k < 2 && instance->values[index] >= 0.0; ++k) ++index;
+        return refuse(instance, index, "a moment of inertia of zero or more");
+    }
+    if (status == LW_BAD_REST)
+        return refuse(instance, first[LW_DYNAMICS_REST] + (uint32_t)lw_fmu_q_index[row], "a rest with a rotation");
+    return lw_report(instance, LW_FMI_ERROR, "Expected a mechanism but was an error (%d) in row %d of its tables.",
+                     status, fault->item);
+}
+
+static int check_solver(const lw_instance *instance) {
+    int32_t integrator = instance->integers[LW_INTEGRATOR], substeps = instance->integers[LW_SUBSTEPS];
+    double rtol = *section(instance, LW_DYNAMICS_RTOL), atol = *section(instance, LW_DYNAMICS_ATOL);
+    if (integrator < LW_EULER || integrator > LW_DOPRI5)
+        return lw_report(instance, LW_FMI_ERROR, "%s: Expected 0 (euler), 1 (semi-implicit euler), 2 (rk4) or 3 "
+                         "(dopri5) but was %d.", lw_name_at(LW_TYPE_INT32, LW_INTEGRATOR), integrator);
+    if (substeps < 1)
+        return lw_report(instance, LW_FMI_ERROR, "%s: Expected at least 1 but was %d.",
+                         lw_name_at(LW_TYPE_INT32, LW_SUBSTEPS), substeps);
+    if (!(rtol >= 0.0)) return refuse(instance, instance->part->first[LW_DYNAMICS_RTOL], "zero or more");
+    if (!(atol > 0.0)) return refuse(instance, instance->part->first[LW_DYNAMICS_ATOL], "more than zero");
+    return LW_FMI_OK;
+}
+
+int lw_part_configure(lw_instance *instance) {
+    lw_fault fault;
+    int status = check_solver(instance);
+    lw_tables tables = {
+        .n = lw_fmu_n, .nq = lw_fmu_nq, .nv = lw_fmu_nv,
+        .parent = lw_fmu_parent, .order = lw_fmu_order, .joint_type = lw_fmu_joint_type,
+        .q_index = lw_fmu_q_index, .v_index = lw_fmu_v_index,
+        .parent_point = section(instance, LW_DYNAMICS_PARENT_POINT), .parent_rotation = lw_fmu_parent_rotation,
+        .child_point = section(instance, LW_DYNAMICS_CHILD_POINT), .child_rotation = lw_fmu_child_rotation,
+        .mass = section(instance, LW_DYNAMICS_MASS), .inertia = section(instance, LW_DYNAMICS_INERTIA),
+        .gravity = section(instance, LW_DYNAMICS_GRAVITY),
+        .stiffness = section(instance, LW_DYNAMICS_STIFFNESS),
+        .damping = section(instance, LW_DYNAMICS_DAMPING), .rest = section(instance, LW_DYNAMICS_REST)};
+    if (status) return status;
+    status = lw_multibody_init(instance->part->multibody, &tables, &fault);
+    return status ? refuse_table(instance, status, &fault) : LW_FMI_OK;
+}
+
+/* ---- trouble of the core ---- */
+
+static int discard(const lw_instance *instance, int status, const lw_fault *fault) {
+    const char *expected = "numbers that stay finite", *was = "an overflow";
+    if (status == LW_SINGULAR) expected = "a joint with inertia to move", was = "a massless body";
+    if (status == LW_STEP_UNDERFLOW) expected = "a substep that meets the tolerance", was = "one of no length";
+    return lw_report(instance, LW_FMI_DISCARD, "Expected %s but was %s at body %d, %.9g s into the step.",
+                     expected, was, fault->item, fault->time);
+}
+
+/* ---- inputs ---- */
+
+/* Force and torque `dt` [s] into the step, as the core takes them: (n, 6). */
+static void pack_wrench(const lw_instance *instance, double dt, double *wrench) {
+    const double *value = section(instance, LW_DYNAMICS_FORCE), *rate = instance->store + RATES;
+    int order = (int)instance->store[ORDER];
+    size_t size = forces();
+    for (size_t i = 0; i < size; ++i) {
+        size_t half = i % (size / 2), at = half / 3 * 6 + half % 3 + (i < size / 2 ? 0 : 3);
+        wrench[at] = value[i];
+        double factor = 1.0;
+        for (int k = 1; k <= order; ++k) {
+            factor *= dt / k;
+            wrench[at] += factor * rate[(size_t)(k - 1) * size + i];
+        }
+    }
+}
+
+/* Where the added inertia is, if it is not zero. */
+static const double *find_added(lw_instance *instance) {
+    if (!(instance->stale & LW_STALE_INPUTS)) return instance->part->added;
+    const double *added = section(instance, LW_DYNAMICS_ADDED_INERTIA);
+    instance->part->added = NULL;
+    for (size_t k = 0; k < 6 * forces(); ++k)
+        if (added[k] != 0.0) instance->part->added = added;
+    instance->stale &= ~LW_STALE_INPUTS;
+    return instance->part->added;
+}
+
+int lw_part_set_input_derivative(lw_instance *instance, uint32_t index, int32_t order, double value) {
+    uint32_t first = instance->part->first[LW_DYNAMICS_FORCE];
+    double *memory = instance->store;
+    if (index - first >= forces()) return 0;
+    memory[RATES + (size_t)(order - 1) * forces() + (index - first)] = value;
+    if (order > memory[ORDER]) memory[ORDER] = order;
+    return 1;
+}
+
+/* ---- outputs ---- */
+
+unsigned lw_part_group(unsigned number) {
+    switch (number) {
+    case LW_DYNAMICS_DER_Q: return RATE;
+    case LW_DYNAMICS_POSITION:
+    case LW_DYNAMICS_ORIENTATION:
+    case LW_DYNAMICS_LINEAR:
+    case LW_DYNAMICS_ANGULAR: return MOTION;
+    case LW_DYNAMICS_KINETIC_ENERGY:
+    case LW_DYNAMICS_POTENTIAL_ENERGY: return ENERGY;
+    default: return ACCELERATION;
+    }
+}
+
+static void load_state(lw_instance *instance) {
+    lw_part *part = instance->part;
+    memcpy(part->state, section(instance, LW_DYNAMICS_Q), lw_state_size() * sizeof(double));
+    part->state[lw_state_size()] = instance->store[PROPOSED];
+}
+
+static int update_motion(lw_instance *instance) {
+    double *orientation = section(instance, LW_DYNAMICS_ORIENTATION);
+    lw_multibody_motion(instance->part->multibody, instance->part->state, section(instance, LW_DYNAMICS_POSITION),
+                        orientation, section(instance, LW_DYNAMICS_LINEAR), section(instance, LW_DYNAMICS_ANGULAR));
+    for (int i = 0; i < lw_fmu_n; ++i)
+        if (!isfinite(orientation[4 * i]))
+            return lw_report(instance, LW_FMI_DISCARD, "Expected a rotation of body %d but was a quaternion of no "
+                             "length.", i);
+    return LW_FMI_OK;
+}
+
+static void split(const double *six, double *linear, double *angular) {
+    for (int i = 0; i < lw_fmu_n; ++i) {
+        memcpy(linear + 3 * i, six + 6 * i, 3 * sizeof(double));
+        memcpy(angular + 3 * i, six + 6 * i + 3, 3 * sizeof(double));
+    }
+}
+
+static int update_acceleration(lw_instance *instance) {
+    lw_part *part = instance->part;
+    lw_fault fault;
+    pack_wrench(instance, 0.0, part->wrench);
+    int status = lw_multibody_evaluate(part->multibody, part->state, part->wrench, find_added(instance),
+                                       part->joint, part->acceleration, part->reaction, part->total, &fault);
+    if (status) return discard(instance, status, &fault);
+    memcpy(section(instance, LW_DYNAMICS_DER_V), part->joint, (size_t)lw_fmu_nv * sizeof(double));
+    split(part->acceleration, section(instance, LW_DYNAMICS_LINEAR_ACCELERATION),
+          section(instance, LW_DYNAMICS_ANGULAR_ACCELERATION));
+    split(part->reaction, section(instance, LW_DYNAMICS_REACTION_FORCE),
+          section(instance, LW_DYNAMICS_REACTION_TORQUE));
+    return LW_FMI_OK;
+}
+
+int lw_part_update(lw_instance *instance, unsigned groups) {
+    lw_part *part = instance->part;
+    int status = LW_FMI_OK;
+    load_state(instance);
+    if (groups & RATE)
+        lw_coordinate_rate(part->multibody, part->state, part->state + lw_fmu_nq, section(instance, LW_DYNAMICS_DER_Q));
+    if (groups & ENERGY)
+        lw_multibody_energy(part->multibody, part->state, section(instance, LW_DYNAMICS_KINETIC_ENERGY),
+                            section(instance, LW_DYNAMICS_POTENTIAL_ENERGY));
+    if (groups & MOTION) status = update_motion(instance);
+    if (!status && groups & ACCELERATION) status = update_acceleration(instance);
+    return status;
+}
+
+int32_t lw_part_output_order(void) { return 1; }
+
+int lw_part_rate(unsigned number) {
+    switch (number) {
+    case LW_DYNAMICS_Q: return LW_DYNAMICS_DER_Q;
+    case LW_DYNAMICS_V: return LW_DYNAMICS_DER_V;
+    case LW_DYNAMICS_POSITION: return LW_DYNAMICS_LINEAR;
+    case LW_DYNAMICS_LINEAR: return LW_DYNAMICS_LINEAR_ACCELERATION;
+    case LW_DYNAMICS_ANGULAR: return LW_DYNAMICS_ANGULAR_ACCELERATION;
+    default: return -1;
+    }
+}
+
+/* ---- steps ---- */
+
+/* Equal substeps under a held wrench are steps of their own; the others are one. */
+int32_t lw_part_pieces(const lw_instance *instance) {
+    int splits = instance->integers[LW_INTEGRATOR] != LW_DOPRI5 && instance->store[ORDER] == 0.0;
+    return splits ? instance->integers[LW_SUBSTEPS] : 1;
+}
+
+int lw_part_advance(lw_instance *instance, double h, int32_t pieces) {
+    lw_part *part = instance->part;
+    double nodes[MAX_ORDER + 1] = {0.0}, work[2];
+    int order = (int)instance->store[ORDER];
+    lw_fault fault = {0, 0.0};
+    load_state(instance);
+    for (int i = 0; i <= order; ++i) {
+        if (order) nodes[i] = (double)i / order;
+        pack_wrench(instance, nodes[i] * h, part->wrench + (size_t)i * forces());
+    }
+    lw_macro_step step = {
+        .state = part->state, .h = h, .nodes = nodes, .wrenches = part->wrench, .count = order + 1,
+        .added_inertia = find_added(instance), .integrator = instance->integers[LW_INTEGRATOR],
+        .substeps = pieces > 1 ? 1 : instance->integers[LW_SUBSTEPS],
+        .rtol = *section(instance, LW_DYNAMICS_RTOL), .atol = *section(instance, LW_DYNAMICS_ATOL),
+        .next = part->state, .work = work, .fault = &fault};
+    int status = lw_multibody_advance(part->multibody, &step);
+    if (status) return discard(instance, status, &fault);
+    memcpy(section(instance, LW_DYNAMICS_Q), part->state, lw_state_size() * sizeof(double));
+    instance->store[PROPOSED] = part->state[lw_state_size()];
+    if (order) memset(instance->store + ORDER, 0, (lw_part_memory() - ORDER) * sizeof(double));
+    return LW_FMI_OK;
+}
+
+void lw_part_accept(lw_instance *instance) { (void)instance; }
+
+/* ---- scales of differences ---- */
+
+/* What resists along one of the six directions of a body: mass, or a moment of inertia. */
+static double resistance(const lw_instance *instance, uint32_t body, uint32_t direction) {
+    const double *mass = section(instance, LW_DYNAMICS_MASS) + body;
+    const double *inertia = section(instance, LW_DYNAMICS_INERTIA) + 6 * body;
+    const double *added = section(instance, LW_DYNAMICS_ADDED_INERTIA) + 36 * body;
+    double largest = fmax(inertia[0], fmax(inertia[1], inertia[2]));
+    return (direction < 3 ? *mass : largest) + fabs(added[7 * direction]);
+}
+
+static double length_scale(const lw_instance *instance, unsigned number, uint32_t body) {
+    lw_vec3 point = lw_load3(section(instance, number) + 3 * body);
+    double mass = resistance(instance, body, 0), inertia = resistance(instance, body, 3);
+    double sum = lw_norm(point) + (mass > 0.0 ? sqrt(inertia / mass) : 0.0);
+    return sum > 0.0 ? sum : 1.0;
+}
+
+double lw_part_scale(const lw_instance *instance, const lw_fmu_variable *variable, uint32_t index) {
+    uint32_t place = index - instance->part->first[variable->section];
+    double size = fabs(instance->values[index]), scale = 0.0;
+    switch (variable->section) {
+    case LW_DYNAMICS_Q: return 1.0;
+    case LW_DYNAMICS_V:
+    case LW_DYNAMICS_FORCE:
+    case LW_DYNAMICS_TORQUE:
+    case LW_DYNAMICS_GRAVITY: return 100.0 * fmax(1.0, size); /* no truncation */
+    case LW_DYNAMICS_PARENT_POINT:
+    case LW_DYNAMICS_CHILD_POINT: return length_scale(instance, variable->section, place / 3);
+    case LW_DYNAMICS_ADDED_INERTIA:
+        scale = sqrt(resistance(instance, place / 36, place % 36 / 6) * resistance(instance, place / 36, place % 6));
+        break;
+    default: scale = size;
+    }
+    return scale > 0.0 ? scale : 1.0;
+}
