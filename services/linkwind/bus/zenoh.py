@@ -23,6 +23,9 @@ from linkwind.protocol import fault_error
 
 LEASE = 1.0  # s without a sign of life after which a participant counts as lost
 TICK = 0.1  # s between two looks of the watchdog
+# s that the dynamics looks for an answer before it sleeps: a processor that is awake answers two to four
+# times faster. Only one side may do so, and only if it does not take the other's processor away.
+SPIN = 200e-6 if len(os.sched_getaffinity(0)) > 1 else 0.0
 FIRST_RESEND = 0.5  # s; the first motion may be lost while declarations still travel
 
 # One runtime for everything: a third less time a round trip than zenoh's separate receive threads.
@@ -136,15 +139,25 @@ class _Endpoint:
             congestion_control=zenoh.CongestionControl.DROP,
         )
 
-    def _receive(self) -> zenoh.Sample:
+    def _receive(self, spin: float = 0.0) -> zenoh.Sample:
+        """Return the next message that is not empty; look for it for ``spin`` [s], then sleep."""
         while True:
-            self._reading = True
-            sample = self._incoming.recv()
-            self._reading = False
+            sample = self._look_for_sample(spin)
+            if sample is None:
+                self._reading = True
+                sample = self._incoming.recv()
+                self._reading = False
             if self._trouble is not None:
                 raise self._trouble
             if len(sample.payload):
                 return sample
+
+    def _look_for_sample(self, spin: float) -> zenoh.Sample | None:
+        end = time.perf_counter() + spin
+        while time.perf_counter() < end:
+            if (sample := self._incoming.try_recv()) is not None:
+                return sample
+        return None
 
     def close(self) -> None:
         """Leave the bus."""
@@ -261,7 +274,7 @@ class ZenohDynamicsLink(_Endpoint):
 
     def receive(self) -> tuple[str, bytes]:
         """Return the next wrench message and its provider; see :class:`~linkwind.bus.base.DynamicsLink`."""
-        sample = self._receive()
+        sample = self._receive(SPIN)
         self._resend_at = None
         return str(sample.key_expr).rsplit("/", 1)[1], sample.payload.to_bytes()
 
