@@ -2,7 +2,8 @@
 
 The step encodes, sends, evaluates the plates, answers, decodes, corrects, predicts and logs; the ping-pong
 only sends bytes there and back. It comes in two kinds: one that sleeps until the answer is there, as
-anybody would write it, and one that looks for it first, as linkwind's dynamics does. Run with ``python -m tests.benchmarks lockstep``.
+anybody would write it, and one that looks for it first, as linkwind's dynamics does. Run with
+``python -m tests.benchmarks lockstep``.
 """
 
 from __future__ import annotations

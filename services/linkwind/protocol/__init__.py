@@ -1,0 +1,11 @@
+"""The lock-step protocol (v1) as two state machines that know no network.
+
+Each side takes bytes and gives bytes; ``bus/`` moves them. The protocol itself is written down in
+``schemas/README.md``, so that a stranger can implement a participant from it.
+"""
+
+from linkwind.protocol.control import fault, fault_error
+from linkwind.protocol.dynamics import DynamicsSession
+from linkwind.protocol.provider import Model, ProviderSession, ProviderState
+
+__all__ = ["DynamicsSession", "Model", "ProviderSession", "ProviderState", "fault", "fault_error"]

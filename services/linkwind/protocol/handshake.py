@@ -1,0 +1,167 @@
+"""Who takes part in a run: the dynamics' answers to control requests."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from linkwind import __version__
+from linkwind.errors import LinkwindError, ParticipantError, RefusedError
+from linkwind.messages import KINDS, WrenchMessage
+from linkwind.protocol.control import Control, fault_error, parse
+from linkwind.schema import SHA256
+from linkwind.spatial import Wrench
+
+
+@dataclass
+class Participant:
+    """What the dynamics knows of one provider."""
+
+    name: str
+    bodies: tuple[int, ...]
+    instance: str = ""
+    ready: bool = False
+    bye: bool = False
+    answered: bool = False
+    payload: bytes = b""
+    message: WrenchMessage | None = None
+    diagnostics: tuple[str, ...] = ()
+    kind: str = "point"
+
+    @property
+    def answer(self) -> Wrench:
+        """Its last answer."""
+        assert self.message is not None
+        return self.message.wrench
+
+
+class HandShake:
+    """Welcomes and refuses providers, until each is ready; hears their faults and goodbyes.
+
+    Attributes:
+        run: id of the run.
+        bodies: names, in the order of the messages.
+        step_ns: communication step size [ns].
+        participants: the providers of the scenario, by name, in its order.
+        failure: an error that ends the run, once there is one.
+    """
+
+    def __init__(
+        self,
+        run: str,
+        scenario_json: str,
+        step_ns: int,
+        steps: int,
+        bodies: Sequence[str],
+        providers: dict[str, Sequence[str]],
+    ) -> None:
+        """Prepare a run.
+
+        Args:
+            run: its id, part of every key.
+            scenario_json: the resolved scenario.
+            step_ns: communication step size [ns].
+            steps: number of steps.
+            bodies: names, in the order of the messages.
+            providers: name of each provider and the bodies that it acts on.
+        """
+        self.run = run
+        self.bodies = tuple(bodies)
+        self.step_ns = step_ns
+        self.failure: LinkwindError | None = None
+        self._scenario_json = scenario_json
+        self._steps = steps
+        index = {name: i for i, name in enumerate(bodies)}
+        self.participants = {
+            name: Participant(name, tuple(index[b] for b in on)) for name, on in providers.items()
+        }
+
+    def control(self, request: bytes) -> bytes:
+        """Answer a control request of a provider; never raises, a wrong request is refused."""
+        try:
+            message = parse(request, "hello", "ready", "bye", "fault")
+            reply = getattr(self, "_on_" + message.WhichOneof("body"))(message)
+        except ParticipantError as error:
+            reply = Control(refuse={"reason": str(error)})
+        return bytes(reply.SerializeToString())
+
+    def _on_hello(self, message: Any) -> Any:
+        hello = message.hello
+        known = self.participants.get(hello.name)
+        if known is None:
+            names = ", ".join(self.participants) or "none"
+            raise RefusedError(f'participant "{hello.name}": expected one of {names}')
+        if known.instance and known.instance != hello.instance:
+            raise RefusedError(f'a participant named "{hello.name}" already takes part in run {self.run}')
+        if hello.schema_sha256 != SHA256:
+            reason = (
+                f'participant "{hello.name}": expected schema {SHA256[:12]} (linkwind {__version__}); got '
+                f"{hello.schema_sha256[:12]} (linkwind {hello.version}). Install the same version on both "
+                "sides."
+            )
+            self.failure = RefusedError(reason)
+            raise self.failure
+        known.instance = hello.instance
+        body = {
+            "run": self.run,
+            "scenario_json": self._scenario_json,
+            "step_ns": self.step_ns,
+            "steps": self._steps,
+            "bodies": self.bodies,
+            "provider_bodies": [self.bodies[i] for i in known.bodies],
+        }
+        return Control(welcome=body)
+
+    def _on_ready(self, message: Any) -> Any:
+        ready = message.ready
+        known = self.participants.get(ready.name)
+        if known is None or not known.instance or known.instance != ready.instance:
+            raise RefusedError(f'"{ready.name}": Ready without Hello')
+        if ready.response_size:
+            self.failure = RefusedError(
+                f'"{ready.name}" returns a response matrix G, which no coupling scheme of this version uses'
+            )
+            raise self.failure
+        known.kind = {number: kind for kind, number in KINDS.items()}.get(ready.kind, "point")
+        known.diagnostics = tuple(ready.diagnostics)
+        known.message = WrenchMessage(
+            self.run,
+            known.name,
+            len(known.bodies),
+            kind=known.kind,
+            added_inertia=ready.added_inertia,
+            diagnostics=known.diagnostics,
+        )
+        known.ready = True
+        return Control(start={})
+
+    def _on_bye(self, message: Any) -> Any:
+        if message.bye.name in self.participants:
+            self.participants[message.bye.name].bye = True
+            self.participants[message.bye.name].answered = True
+        return Control(start={})
+
+    def _on_fault(self, message: Any) -> Any:
+        self.failure = fault_error(message.SerializeToString())
+        return Control(start={})
+
+    @property
+    def providers(self) -> dict[str, list[str]]:
+        """Name of each provider and the bodies that it acts on."""
+        return {p.name: [self.bodies[i] for i in p.bodies] for p in self.participants.values()}
+
+    @property
+    def not_ready(self) -> list[str]:
+        """Providers that have not said Ready."""
+        return [p.name for p in self.participants.values() if not p.ready]
+
+    @property
+    def not_gone(self) -> list[str]:
+        """Providers that have not said Bye."""
+        return [p.name for p in self.participants.values() if not p.bye]
+
+    @property
+    def mean(self) -> bool:
+        """Whether some provider answers with the mean over the step, which must not be interpolated."""
+        return any(p.kind == "mean" for p in self.participants.values())

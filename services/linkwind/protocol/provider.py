@@ -1,0 +1,200 @@
+"""A provider's side of the protocol."""
+
+from __future__ import annotations
+
+import logging
+import uuid
+from collections.abc import Callable
+from enum import Enum, auto
+from typing import Protocol
+
+from linkwind import __version__
+from linkwind.errors import ProtocolError, RefusedError
+from linkwind.messages import KINDS, MotionMessage, WrenchMessage
+from linkwind.protocol.control import Control, fault, parse
+from linkwind.schema import SHA256
+from linkwind.spatial import Motion, Wrench
+
+_log = logging.getLogger("linkwind")
+
+
+class Capabilities(Protocol):
+    """What a force model can do and returns."""
+
+    @property
+    def kind(self) -> str: ...
+    @property
+    def rollback(self) -> bool: ...
+    @property
+    def added_inertia(self) -> bool: ...
+    @property
+    def response_size(self) -> int: ...
+    @property
+    def own_step_ns(self) -> int: ...
+    @property
+    def diagnostics(self) -> tuple[str, ...]: ...
+
+
+class Model(Protocol):
+    """A force model as the protocol sees it (``linkwind.aero.base.ForceModel`` is one)."""
+
+    @property
+    def capabilities(self) -> Capabilities: ...
+    def commit(self, t: float, motion: Motion) -> None: ...
+    def evaluate(self, t: float, motion: Motion, wrench: Wrench) -> None: ...
+    def save(self) -> bytes: ...
+    def restore(self, blob: bytes) -> None: ...
+
+
+class ProviderState(Enum):
+    """Where a provider is in its life."""
+
+    NEW = auto()
+    WELCOME = auto()
+    RUNNING = auto()
+    DONE = auto()
+
+
+class ProviderSession:
+    """A provider's side of the protocol: hello → welcome → ready → (motion → wrench)* → bye."""
+
+    def __init__(self, name: str, build: Callable[[str, str], Model]) -> None:
+        """Prepare to take part.
+
+        Args:
+            name: of the provider, as in the scenario.
+            build: called with the resolved scenario (JSON) and the name, returns the force model.
+        """
+        self.name = name
+        self.instance = uuid.uuid4().hex
+        self.state = ProviderState.NEW
+        self.run = ""
+        self.at = (-1, 0)
+        self._build = build
+        self._answer = b""
+
+    def hello(self) -> bytes:
+        """Return the message that asks to take part."""
+        body = {
+            "name": self.name,
+            "schema_sha256": SHA256,
+            "version": __version__,
+            "instance": self.instance,
+        }
+        return bytes(Control(hello=body).SerializeToString())
+
+    def welcome(self, reply: bytes) -> None:
+        """Take the answer to hello.
+
+        Raises:
+            RefusedError: the dynamics refuses, with its reason.
+        """
+        message = parse(reply, "welcome", "refuse")
+        if message.WhichOneof("body") == "refuse":
+            raise RefusedError(f'the dynamics refused "{self.name}": {message.refuse.reason}')
+        welcome = message.welcome
+        self.run = welcome.run
+        self._step_ns = welcome.step_ns
+        self._bodies = list(welcome.provider_bodies)
+        self._scenario_json = welcome.scenario_json
+        self._motion = MotionMessage(self.run, len(welcome.bodies))
+        self.state = ProviderState.WELCOME
+
+    def build(self) -> None:
+        """Build the force model from the scenario of the welcome.
+
+        Raises:
+            InputError: the scenario does not make a model.
+        """
+        self._model = self._build(self._scenario_json, self.name)
+        can = self._model.capabilities
+        self._wrench = WrenchMessage(
+            self.run,
+            self.name,
+            len(self._bodies),
+            kind=can.kind,
+            added_inertia=can.added_inertia,
+            response_size=can.response_size,
+            diagnostics=can.diagnostics,
+        )
+        self._checkpoint = self._model.save() if can.rollback else None
+
+    def ready(self) -> bytes:
+        """Return the message that says that motion can come."""
+        can = self._model.capabilities
+        body = {
+            "name": self.name,
+            "instance": self.instance,
+            "kind": KINDS[can.kind],
+            "rollback": can.rollback,
+            "added_inertia": can.added_inertia,
+            "response_size": can.response_size,
+            "own_step_ns": can.own_step_ns,
+            "diagnostics": can.diagnostics,
+        }
+        return bytes(Control(ready=body).SerializeToString())
+
+    def started(self, reply: bytes) -> None:
+        """Take the answer to ready."""
+        message = parse(reply, "start", "refuse")
+        if message.WhichOneof("body") == "refuse":
+            raise RefusedError(f'the dynamics refused "{self.name}": {message.refuse.reason}')
+        self.state = ProviderState.RUNNING
+
+    def answer(self, payload: bytes) -> bytes | None:
+        """Take a motion message, return the wrench; None when there is nothing (more) to say.
+
+        A repeated (step, iteration) is answered from memory, a stale one dropped.
+
+        Raises:
+            ProtocolError: a gap, a message of another run, or an iteration without rollback.
+            SimulationError: the model failed.
+        """
+        motion = self._motion
+        motion.load(payload, f'"{self.name}": motion')
+        at = motion.at
+        if motion.final:
+            self._model.commit(motion.time_ns / 1e9, motion.accepted)
+            self.state = ProviderState.DONE
+            return None
+        if at <= self.at:
+            if at == self.at:
+                return self._answer
+            _log.warning(
+                '"%s": dropped a stale motion message (step %d after %d)', self.name, at[0], self.at[0]
+            )
+            return None
+        self._advance(*at)
+        self._model.evaluate(motion.time_ns / 1e9, motion.trial, self._wrench.wrench)
+        self._wrench.stamp(at[0], at[1], motion.time_ns)
+        self.at = at
+        self._answer = self._wrench.payload()
+        return self._answer
+
+    def _advance(self, step: int, iteration: int) -> None:
+        """Commit the accepted state when the step is new, go back to it for another iteration."""
+        motion = self._motion
+        last_step, last_iteration = self.at
+        if step == last_step + 1 and iteration == 0:
+            if step:
+                self._model.commit((motion.time_ns - self._step_ns) / 1e9, motion.accepted)
+                if self._checkpoint is not None:
+                    self._checkpoint = self._model.save()
+        elif step == last_step and iteration == last_iteration + 1:
+            if self._checkpoint is None:
+                raise ProtocolError(f'"{self.name}": iteration {iteration} asked, but it cannot roll back')
+            self._model.restore(self._checkpoint)
+        else:
+            raise ProtocolError(
+                f'"{self.name}": expected step {last_step + 1} iteration 0; got step {step} '
+                f"iteration {iteration}. A motion message was lost."
+            )
+
+    def bye(self) -> bytes:
+        """Return the answer to the final motion."""
+        return bytes(Control(bye={"name": self.name}).SerializeToString())
+
+    def fault(self, error: BaseException) -> bytes:
+        """Return the message that tells the others that this provider cannot go on."""
+        step, iteration = self._motion.at if self.run else (0, 0)
+        return fault(self.name, step, iteration, error)
