@@ -41,7 +41,8 @@ typedef struct {
 
 FMI2_EXPORT const char *fmi2GetTypesPlatform(void);
 FMI2_EXPORT const char *fmi2GetVersion(void);
-FMI2_EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component, fmi2Boolean on, size_t n, const fmi2String categories[]);
+FMI2_EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component, fmi2Boolean on, size_t n,
+                                           const fmi2String categories[]);
 
 FMI2_EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type, fmi2String guid, fmi2String resources,
                                           const fmi2CallbackFunctions *, fmi2Boolean visible,
@@ -54,10 +55,10 @@ FMI2_EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component);
 FMI2_EXPORT fmi2Status fmi2Terminate(fmi2Component);
 FMI2_EXPORT fmi2Status fmi2Reset(fmi2Component);
 
-#define FMI2_ACCESS(type)                                                                                \
-    FMI2_EXPORT fmi2Status fmi2Get##type(fmi2Component, const fmi2ValueReference[], size_t,              \
-                                         fmi2##type values[]);                                           \
-    FMI2_EXPORT fmi2Status fmi2Set##type(fmi2Component, const fmi2ValueReference[], size_t,              \
+#define FMI2_ACCESS(type)                                                                                    \
+    FMI2_EXPORT fmi2Status fmi2Get##type(fmi2Component, const fmi2ValueReference[], size_t,                  \
+                                         fmi2##type values[]);                                               \
+    FMI2_EXPORT fmi2Status fmi2Set##type(fmi2Component, const fmi2ValueReference[], size_t,                  \
                                          const fmi2##type values[]);
 FMI2_ACCESS(Real)
 FMI2_ACCESS(Integer)
@@ -70,8 +71,8 @@ FMI2_EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component, fmi2FMUstate *);
 FMI2_EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component, fmi2FMUstate, size_t *);
 FMI2_EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component, fmi2FMUstate, fmi2Byte bytes[], size_t);
 FMI2_EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component, const fmi2Byte bytes[], size_t, fmi2FMUstate *);
-FMI2_EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component, const fmi2ValueReference unknowns[], size_t,
-                                                    const fmi2ValueReference knowns[], size_t,
+FMI2_EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component, const fmi2ValueReference unknowns[],
+                                                    size_t, const fmi2ValueReference knowns[], size_t,
                                                     const fmi2Real seed[], fmi2Real sensitivity[]);
 
 /* Model Exchange */
@@ -92,7 +93,8 @@ FMI2_EXPORT fmi2Status fmi2SetRealInputDerivatives(fmi2Component, const fmi2Valu
                                                    const fmi2Integer orders[], const fmi2Real values[]);
 FMI2_EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component, const fmi2ValueReference[], size_t,
                                                     const fmi2Integer orders[], fmi2Real values[]);
-FMI2_EXPORT fmi2Status fmi2DoStep(fmi2Component, fmi2Real point, fmi2Real size, fmi2Boolean no_set_state_before);
+FMI2_EXPORT fmi2Status fmi2DoStep(fmi2Component, fmi2Real point, fmi2Real size,
+                                  fmi2Boolean no_set_state_before);
 FMI2_EXPORT fmi2Status fmi2CancelStep(fmi2Component);
 FMI2_EXPORT fmi2Status fmi2GetStatus(fmi2Component, const fmi2StatusKind, fmi2Status *);
 FMI2_EXPORT fmi2Status fmi2GetRealStatus(fmi2Component, const fmi2StatusKind, fmi2Real *);

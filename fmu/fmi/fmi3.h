@@ -32,7 +32,12 @@ typedef const fmi3Byte *fmi3Binary;
 
 typedef enum { fmi3OK, fmi3Warning, fmi3Discard, fmi3Error, fmi3Fatal } fmi3Status;
 typedef enum {
-    fmi3Independent, fmi3Constant, fmi3Fixed, fmi3Tunable, fmi3Discrete, fmi3Dependent
+    fmi3Independent,
+    fmi3Constant,
+    fmi3Fixed,
+    fmi3Tunable,
+    fmi3Discrete,
+    fmi3Dependent
 } fmi3DependencyKind;
 typedef enum { fmi3IntervalNotYetKnown, fmi3IntervalUnchanged, fmi3IntervalChanged } fmi3IntervalQualifier;
 
@@ -50,7 +55,8 @@ typedef void (*fmi3UnlockPreemptionCallback)(void);
 #define FMI3_REFERENCES fmi3Instance, const fmi3ValueReference[], size_t
 
 FMI3_EXPORT const char *fmi3GetVersion(void);
-FMI3_EXPORT fmi3Status fmi3SetDebugLogging(fmi3Instance, fmi3Boolean on, size_t n, const fmi3String categories[]);
+FMI3_EXPORT fmi3Status fmi3SetDebugLogging(fmi3Instance, fmi3Boolean on, size_t n,
+                                           const fmi3String categories[]);
 
 FMI3_EXPORT fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources,
                                                       fmi3Boolean visible, fmi3Boolean logging,
@@ -59,10 +65,12 @@ FMI3_EXPORT fmi3Instance fmi3InstantiateCoSimulation(
     fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible, fmi3Boolean logging,
     fmi3Boolean event_mode_used, fmi3Boolean early_return_allowed, const fmi3ValueReference intermediate[],
     size_t, fmi3InstanceEnvironment, fmi3LogMessageCallback, fmi3IntermediateUpdateCallback);
-FMI3_EXPORT fmi3Instance fmi3InstantiateScheduledExecution(
-    fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible, fmi3Boolean logging,
-    fmi3InstanceEnvironment, fmi3LogMessageCallback, fmi3ClockUpdateCallback, fmi3LockPreemptionCallback,
-    fmi3UnlockPreemptionCallback);
+FMI3_EXPORT fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token,
+                                                           fmi3String resources, fmi3Boolean visible,
+                                                           fmi3Boolean logging, fmi3InstanceEnvironment,
+                                                           fmi3LogMessageCallback, fmi3ClockUpdateCallback,
+                                                           fmi3LockPreemptionCallback,
+                                                           fmi3UnlockPreemptionCallback);
 FMI3_EXPORT void fmi3FreeInstance(fmi3Instance);
 FMI3_EXPORT fmi3Status fmi3EnterInitializationMode(fmi3Instance, fmi3Boolean tolerance_defined,
                                                    fmi3Float64 tolerance, fmi3Float64 start,
@@ -72,8 +80,8 @@ FMI3_EXPORT fmi3Status fmi3EnterEventMode(fmi3Instance);
 FMI3_EXPORT fmi3Status fmi3Terminate(fmi3Instance);
 FMI3_EXPORT fmi3Status fmi3Reset(fmi3Instance);
 
-#define FMI3_ACCESS(type)                                                                                \
-    FMI3_EXPORT fmi3Status fmi3Get##type(FMI3_REFERENCES, fmi3##type values[], size_t);                  \
+#define FMI3_ACCESS(type)                                                                                    \
+    FMI3_EXPORT fmi3Status fmi3Get##type(FMI3_REFERENCES, fmi3##type values[], size_t);                      \
     FMI3_EXPORT fmi3Status fmi3Set##type(FMI3_REFERENCES, const fmi3##type values[], size_t);
 FMI3_ACCESS(Float32)
 FMI3_ACCESS(Float64)
@@ -88,13 +96,16 @@ FMI3_ACCESS(UInt64)
 FMI3_ACCESS(Boolean)
 FMI3_ACCESS(String)
 FMI3_EXPORT fmi3Status fmi3GetBinary(FMI3_REFERENCES, size_t sizes[], fmi3Binary values[], size_t);
-FMI3_EXPORT fmi3Status fmi3SetBinary(FMI3_REFERENCES, const size_t sizes[], const fmi3Binary values[], size_t);
+FMI3_EXPORT fmi3Status fmi3SetBinary(FMI3_REFERENCES, const size_t sizes[], const fmi3Binary values[],
+                                     size_t);
 FMI3_EXPORT fmi3Status fmi3GetClock(FMI3_REFERENCES, fmi3Clock values[]);
 FMI3_EXPORT fmi3Status fmi3SetClock(FMI3_REFERENCES, const fmi3Clock values[]);
 FMI3_EXPORT fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance, fmi3ValueReference, size_t *);
-FMI3_EXPORT fmi3Status fmi3GetVariableDependencies(fmi3Instance, fmi3ValueReference, size_t dependent_elements[],
+FMI3_EXPORT fmi3Status fmi3GetVariableDependencies(fmi3Instance, fmi3ValueReference,
+                                                   size_t dependent_elements[],
                                                    fmi3ValueReference independents[],
-                                                   size_t independent_elements[], fmi3DependencyKind[], size_t);
+                                                   size_t independent_elements[], fmi3DependencyKind[],
+                                                   size_t);
 
 FMI3_EXPORT fmi3Status fmi3GetFMUState(fmi3Instance, fmi3FMUState *);
 FMI3_EXPORT fmi3Status fmi3SetFMUState(fmi3Instance, fmi3FMUState);
@@ -102,18 +113,19 @@ FMI3_EXPORT fmi3Status fmi3FreeFMUState(fmi3Instance, fmi3FMUState *);
 FMI3_EXPORT fmi3Status fmi3SerializedFMUStateSize(fmi3Instance, fmi3FMUState, size_t *);
 FMI3_EXPORT fmi3Status fmi3SerializeFMUState(fmi3Instance, fmi3FMUState, fmi3Byte bytes[], size_t);
 FMI3_EXPORT fmi3Status fmi3DeserializeFMUState(fmi3Instance, const fmi3Byte bytes[], size_t, fmi3FMUState *);
-#define FMI3_DERIVATIVE(kind)                                                                            \
-    FMI3_EXPORT fmi3Status fmi3Get##kind##Derivative(                                                    \
-        fmi3Instance, const fmi3ValueReference unknowns[], size_t, const fmi3ValueReference knowns[], size_t, \
-        const fmi3Float64 seed[], size_t, fmi3Float64 sensitivity[], size_t);
+#define FMI3_DERIVATIVE(kind)                                                                                \
+    FMI3_EXPORT fmi3Status fmi3Get##kind##Derivative(                                                        \
+        fmi3Instance, const fmi3ValueReference unknowns[], size_t, const fmi3ValueReference knowns[],        \
+        size_t, const fmi3Float64 seed[], size_t, fmi3Float64 sensitivity[], size_t);
 FMI3_DERIVATIVE(Directional)
 FMI3_DERIVATIVE(Adjoint)
 
 FMI3_EXPORT fmi3Status fmi3EnterConfigurationMode(fmi3Instance);
 FMI3_EXPORT fmi3Status fmi3ExitConfigurationMode(fmi3Instance);
-FMI3_EXPORT fmi3Status fmi3GetIntervalDecimal(FMI3_REFERENCES, fmi3Float64 intervals[], fmi3IntervalQualifier[]);
-FMI3_EXPORT fmi3Status fmi3GetIntervalFraction(FMI3_REFERENCES, fmi3UInt64 counters[], fmi3UInt64 resolutions[],
-                                               fmi3IntervalQualifier[]);
+FMI3_EXPORT fmi3Status fmi3GetIntervalDecimal(FMI3_REFERENCES, fmi3Float64 intervals[],
+                                              fmi3IntervalQualifier[]);
+FMI3_EXPORT fmi3Status fmi3GetIntervalFraction(FMI3_REFERENCES, fmi3UInt64 counters[],
+                                               fmi3UInt64 resolutions[], fmi3IntervalQualifier[]);
 FMI3_EXPORT fmi3Status fmi3GetShiftDecimal(FMI3_REFERENCES, fmi3Float64 shifts[]);
 FMI3_EXPORT fmi3Status fmi3GetShiftFraction(FMI3_REFERENCES, fmi3UInt64 counters[], fmi3UInt64 resolutions[]);
 FMI3_EXPORT fmi3Status fmi3SetIntervalDecimal(FMI3_REFERENCES, const fmi3Float64 intervals[]);
@@ -123,9 +135,10 @@ FMI3_EXPORT fmi3Status fmi3SetShiftDecimal(FMI3_REFERENCES, const fmi3Float64 sh
 FMI3_EXPORT fmi3Status fmi3SetShiftFraction(FMI3_REFERENCES, const fmi3UInt64 counters[],
                                             const fmi3UInt64 resolutions[]);
 FMI3_EXPORT fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance);
-FMI3_EXPORT fmi3Status fmi3UpdateDiscreteStates(fmi3Instance, fmi3Boolean *need_update, fmi3Boolean *terminate,
-                                                fmi3Boolean *nominals_changed, fmi3Boolean *values_changed,
-                                                fmi3Boolean *next_event_defined, fmi3Float64 *next_event);
+FMI3_EXPORT fmi3Status fmi3UpdateDiscreteStates(fmi3Instance, fmi3Boolean *need_update,
+                                                fmi3Boolean *terminate, fmi3Boolean *nominals_changed,
+                                                fmi3Boolean *values_changed, fmi3Boolean *next_event_defined,
+                                                fmi3Float64 *next_event);
 
 /* Model Exchange */
 FMI3_EXPORT fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance);
@@ -142,8 +155,8 @@ FMI3_EXPORT fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance, size_t *);
 
 /* Co-Simulation and Scheduled Execution */
 FMI3_EXPORT fmi3Status fmi3EnterStepMode(fmi3Instance);
-FMI3_EXPORT fmi3Status fmi3GetOutputDerivatives(FMI3_REFERENCES, const fmi3Int32 orders[], fmi3Float64 values[],
-                                                size_t);
+FMI3_EXPORT fmi3Status fmi3GetOutputDerivatives(FMI3_REFERENCES, const fmi3Int32 orders[],
+                                                fmi3Float64 values[], size_t);
 FMI3_EXPORT fmi3Status fmi3DoStep(fmi3Instance, fmi3Float64 point, fmi3Float64 size,
                                   fmi3Boolean no_set_state_before, fmi3Boolean *event_needed,
                                   fmi3Boolean *terminate, fmi3Boolean *early_return,

@@ -13,8 +13,9 @@ static int check_step(const lw_instance *instance, double point, double size) {
         return lw_report(instance, LW_FMI_ERROR, "Expected currentCommunicationPoint = %.17g but was %.17g.",
                          instance->time, point);
     if (point + size > instance->stop + slack)
-        return lw_report(instance, LW_FMI_ERROR, "Expected a step that ends by stopTime = %.17g but was %.17g.",
-                         instance->stop, point + size);
+        return lw_report(instance, LW_FMI_ERROR,
+                         "Expected a step that ends by stopTime = %.17g but was %.17g.", instance->stop,
+                         point + size);
     return LW_FMI_OK;
 }
 
@@ -75,7 +76,8 @@ static int check_input(const lw_instance *instance, uint32_t reference, int32_t 
     if (v->causality != LW_INPUT)
         return lw_report(instance, LW_FMI_ERROR, "%s: Expected an input but was another variable.", v->name);
     if (order < 1 || order > 3)
-        return lw_report(instance, LW_FMI_ERROR, "%s: Expected an order of 1 to 3 but was %d.", v->name, order);
+        return lw_report(instance, LW_FMI_ERROR, "%s: Expected an order of 1 to 3 but was %d.", v->name,
+                         order);
     if (!isfinite(value))
         return lw_report(instance, LW_FMI_ERROR, "%s: Expected a finite number but was %g.", v->name, value);
     return LW_FMI_OK;
@@ -103,7 +105,8 @@ static int output_derivative(lw_instance *instance, uint32_t reference, double *
     int section = v->type == LW_TYPE_TIME ? -1 : lw_part_rate(v->section);
     if (section >= 0) {
         int status = lw_update(instance, lw_part_group((unsigned)section));
-        uint32_t rate = v->offset - lw_part_first(instance, v->section) + lw_part_first(instance, (unsigned)section);
+        uint32_t rate = v->offset - lw_part_first(instance, v->section) +
+                        lw_part_first(instance, (unsigned)section);
         memcpy(values, instance->values + rate, v->size * sizeof(double));
         return status;
     }
@@ -121,13 +124,15 @@ static int output_derivative(lw_instance *instance, uint32_t reference, double *
 int lw_get_output_derivatives(lw_instance *instance, const uint32_t *references, size_t n,
                               const int32_t *orders, double *values, size_t count) {
     size_t found = 0;
-    if (n && !(references && orders && values)) return lw_missing(instance, "valueReferences, orders or values");
+    if (n && !(references && orders && values))
+        return lw_missing(instance, "valueReferences, orders or values");
     for (size_t i = 0; i < n; ++i) {
         const lw_fmu_variable *v = lw_variable(instance, references[i]);
         if (!v) return LW_FMI_ERROR;
         if (v->type == LW_TYPE_INT32 || orders[i] < 1 || orders[i] > lw_part_output_order())
-            return lw_report(instance, LW_FMI_ERROR, "%s: Expected a Float64 and an order of 1, at most %d, but was %d.",
-                             v->name, lw_part_output_order(), orders[i]);
+            return lw_report(instance, LW_FMI_ERROR,
+                             "%s: Expected a Float64 and an order of 1, at most %d, but was %d.", v->name,
+                             lw_part_output_order(), orders[i]);
         found += v->size;
     }
     if (found != count)

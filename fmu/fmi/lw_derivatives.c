@@ -19,7 +19,8 @@ static const double weights[3] = {3.0 / 4.0, -3.0 / 20.0, 1.0 / 60.0};
 static int check(const lw_instance *instance, lw_variables variables, int known, const double *numbers,
                  const char *name) {
     size_t found = 0;
-    if ((variables.n && !variables.references) || (variables.count && !numbers)) return lw_missing(instance, name);
+    if ((variables.n && !variables.references) || (variables.count && !numbers))
+        return lw_missing(instance, name);
     for (size_t i = 0; i < variables.n; ++i) {
         const lw_fmu_variable *v = lw_variable(instance, variables.references[i]);
         if (!v) return LW_FMI_ERROR;

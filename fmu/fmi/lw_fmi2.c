@@ -5,8 +5,8 @@
 
 #include "lw_part.h"
 
-#define ENTER(call)                                                                                      \
-    lw_instance *instance = lw_enter(c, __func__, LW_FMI2_##call);                                       \
+#define ENTER(call)                                                                                          \
+    lw_instance *instance = lw_enter(c, __func__, LW_FMI2_##call);                                           \
     if (!instance) return fmi2Error
 
 /* ---- messages: a logger takes a format, so that a percent sign has to be doubled ---- */
@@ -21,7 +21,8 @@ static void deliver(const lw_instance *instance, int status, const char *categor
         format[used++] = *text;
     }
     format[used] = 0;
-    ((logger_type)instance->logger)(instance->environment, instance->name, (fmi2Status)status, category, format);
+    ((logger_type)instance->logger)(instance->environment, instance->name, (fmi2Status)status, category,
+                                    format);
 }
 
 static fmi2Status unsupported(const lw_instance *instance, const char *was) {
@@ -40,7 +41,8 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const 
 }
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
-                              const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging) {
+                              const fmi2CallbackFunctions *functions, fmi2Boolean visible,
+                              fmi2Boolean logging) {
     lw_instance with = {.function = __func__, .deliver = deliver, .logged = logging ? ~0u : 0u};
     (void)resources, (void)visible;
     if (functions) {
@@ -56,8 +58,8 @@ void fmi2FreeInstance(fmi2Component c) {
     if (c) lw_free(c);
 }
 
-fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance, fmi2Real start,
-                               fmi2Boolean stop_defined, fmi2Real stop) {
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance,
+                               fmi2Real start, fmi2Boolean stop_defined, fmi2Real stop) {
     ENTER(SETUP);
     (void)tolerance_defined, (void)tolerance; /* rtol and atol are parameters */
     return (fmi2Status)lw_set_experiment(instance, start, stop_defined, stop);
@@ -103,23 +105,25 @@ fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t
     return (fmi2Status)lw_get_int32(instance, vr, nvr, value, nvr);
 }
 
-fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[]) {
+fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                          const fmi2Integer value[]) {
     ENTER(SET);
     return (fmi2Status)lw_set_int32(instance, vr, nvr, value, nvr);
 }
 
 /* There are no variables of the other types; a list without any is fine. */
-#define NO_VARIABLES(type)                                                                               \
-    fmi2Status fmi2Get##type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2##type value[]) { \
-        ENTER(GET);                                                                                      \
-        (void)vr, (void)value;                                                                           \
-        return nvr ? unsupported(instance, "a model without " #type " variables") : fmi2OK;              \
-    }                                                                                                    \
-    fmi2Status fmi2Set##type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,                 \
-                             const fmi2##type value[]) {                                                 \
-        ENTER(SET);                                                                                      \
-        (void)vr, (void)value;                                                                           \
-        return nvr ? unsupported(instance, "a model without " #type " variables") : fmi2OK;              \
+#define NO_VARIABLES(type)                                                                                   \
+    fmi2Status fmi2Get##type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,                     \
+                             fmi2##type value[]) {                                                           \
+        ENTER(GET);                                                                                          \
+        (void)vr, (void)value;                                                                               \
+        return nvr ? unsupported(instance, "a model without " #type " variables") : fmi2OK;                  \
+    }                                                                                                        \
+    fmi2Status fmi2Set##type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,                     \
+                             const fmi2##type value[]) {                                                     \
+        ENTER(SET);                                                                                          \
+        (void)vr, (void)value;                                                                               \
+        return nvr ? unsupported(instance, "a model without " #type " variables") : fmi2OK;                  \
     }
 NO_VARIABLES(Boolean)
 NO_VARIABLES(String)
@@ -151,14 +155,15 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte b
     return (fmi2Status)lw_serialize(instance, state, (unsigned char *)bytes, size);
 }
 
-fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state) {
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size,
+                                   fmi2FMUstate *state) {
     ENTER(STATE);
     return (fmi2Status)lw_deserialize(instance, (const unsigned char *)bytes, size, state);
 }
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t n_unknown,
-                                        const fmi2ValueReference known[], size_t n_known, const fmi2Real seed[],
-                                        fmi2Real sensitivity[]) {
+                                        const fmi2ValueReference known[], size_t n_known,
+                                        const fmi2Real seed[], fmi2Real sensitivity[]) {
     ENTER(DERIVATIVE);
     lw_variables unknowns = {unknown, n_unknown, n_unknown}, knowns = {known, n_known, n_known};
     return (fmi2Status)lw_directional_derivative(instance, unknowns, knowns, seed, sensitivity);
@@ -189,7 +194,8 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set_state
                                        fmi2Boolean *enter_event_mode, fmi2Boolean *terminate) {
     ENTER(COMPLETED_STEP);
     (void)no_set_state_before;
-    if (!enter_event_mode || !terminate) return (fmi2Status)lw_missing(instance, "enterEventMode or terminateSimulation");
+    if (!enter_event_mode || !terminate)
+        return (fmi2Status)lw_missing(instance, "enterEventMode or terminateSimulation");
     *enter_event_mode = *terminate = fmi2False;
     lw_part_accept(instance);
     return fmi2OK;
@@ -255,7 +261,8 @@ fmi2Status fmi2CancelStep(fmi2Component c) {
 /* ---- status: steps are never pending ---- */
 
 static fmi2Status no_status(const lw_instance *instance, fmi2StatusKind kind) {
-    return (fmi2Status)lw_report(instance, LW_FMI_DISCARD, "Expected a kind of status of this type but was %d.", kind);
+    return (fmi2Status)lw_report(instance, LW_FMI_DISCARD,
+                                 "Expected a kind of status of this type but was %d.", kind);
 }
 
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value) {

@@ -3,8 +3,8 @@
 
 #include "lw_part.h"
 
-#define ENTER(call)                                                                                      \
-    lw_instance *instance = lw_enter(c, __func__, LW_FMI3_##call);                                       \
+#define ENTER(call)                                                                                          \
+    lw_instance *instance = lw_enter(c, __func__, LW_FMI3_##call);                                           \
     if (!instance) return fmi3Error
 
 static void deliver(const lw_instance *instance, int status, const char *category, const char *text) {
@@ -26,9 +26,14 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n, const f
 
 fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources,
                                           fmi3Boolean visible, fmi3Boolean logging,
-                                          fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger) {
-    lw_instance with = {.function = __func__, .deliver = deliver, .logger = (lw_callback)logger,
-                        .environment = environment, .logged = logging ? ~0u : 0u, .kind = LW_MODEL_EXCHANGE};
+                                          fmi3InstanceEnvironment environment,
+                                          fmi3LogMessageCallback logger) {
+    lw_instance with = {.function = __func__,
+                        .deliver = deliver,
+                        .logger = (lw_callback)logger,
+                        .environment = environment,
+                        .logged = logging ? ~0u : 0u,
+                        .kind = LW_MODEL_EXCHANGE};
     (void)resources, (void)visible;
     return lw_create(&with, name, token);
 }
@@ -36,20 +41,26 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi
 /* The callback after each piece of a step. */
 static int intermediate(lw_instance *instance, int last, double *until) {
     fmi3Boolean requested = false;
-    ((fmi3IntermediateUpdateCallback)instance->update)(instance->environment, instance->time, !last, true, true,
-                                                       instance->early_return_allowed && !last, &requested, until);
+    ((fmi3IntermediateUpdateCallback)instance->update)(instance->environment, instance->time, !last, true,
+                                                       true, instance->early_return_allowed && !last,
+                                                       &requested, until);
     return instance->early_return_allowed && requested;
 }
 
 fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources,
-                                         fmi3Boolean visible, fmi3Boolean logging, fmi3Boolean event_mode_used,
-                                         fmi3Boolean early_return_allowed,
+                                         fmi3Boolean visible, fmi3Boolean logging,
+                                         fmi3Boolean event_mode_used, fmi3Boolean early_return_allowed,
                                          const fmi3ValueReference intermediate_references[], size_t n,
                                          fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
                                          fmi3IntermediateUpdateCallback update) {
-    lw_instance with = {.function = __func__, .deliver = deliver, .logger = (lw_callback)logger,
-                        .environment = environment, .logged = ~0u, .kind = LW_CO_SIMULATION,
-                        .update = (lw_callback)update, .intermediate = update ? intermediate : NULL,
+    lw_instance with = {.function = __func__,
+                        .deliver = deliver,
+                        .logger = (lw_callback)logger,
+                        .environment = environment,
+                        .logged = ~0u,
+                        .kind = LW_CO_SIMULATION,
+                        .update = (lw_callback)update,
+                        .intermediate = update ? intermediate : NULL,
                         .early_return_allowed = early_return_allowed};
     (void)resources, (void)visible;
     if (event_mode_used) return unsupported(&with, "eventModeUsed = false (there is no Event Mode)"), NULL;
@@ -62,12 +73,17 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String resources,
                                                fmi3Boolean visible, fmi3Boolean logging,
-                                               fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
-                                               fmi3ClockUpdateCallback update, fmi3LockPreemptionCallback lock,
+                                               fmi3InstanceEnvironment environment,
+                                               fmi3LogMessageCallback logger, fmi3ClockUpdateCallback update,
+                                               fmi3LockPreemptionCallback lock,
                                                fmi3UnlockPreemptionCallback unlock) {
-    lw_instance with = {.function = __func__, .deliver = deliver, .logger = (lw_callback)logger,
-                        .environment = environment, .logged = ~0u};
-    (void)name, (void)token, (void)resources, (void)visible, (void)logging, (void)update, (void)lock, (void)unlock;
+    lw_instance with = {.function = __func__,
+                        .deliver = deliver,
+                        .logger = (lw_callback)logger,
+                        .environment = environment,
+                        .logged = ~0u};
+    (void)name, (void)token, (void)resources, (void)visible, (void)logging, (void)update, (void)lock,
+        (void)unlock;
     return unsupported(&with, "Co-Simulation or Model Exchange (there is no Scheduled Execution)"), NULL;
 }
 
@@ -109,38 +125,40 @@ fmi3Status fmi3Reset(fmi3Instance c) {
 
 /* ---- values ---- */
 
-fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, fmi3Float64 values[], size_t n) {
+fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, fmi3Float64 values[],
+                          size_t n) {
     ENTER(GET);
     return (fmi3Status)lw_get_float64(instance, vr, nvr, values, n);
 }
 
-fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, const fmi3Float64 values[],
-                          size_t n) {
+fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                          const fmi3Float64 values[], size_t n) {
     ENTER(SET);
     return (fmi3Status)lw_set_float64(instance, vr, nvr, values, n);
 }
 
-fmi3Status fmi3GetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, fmi3Int32 values[], size_t n) {
+fmi3Status fmi3GetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, fmi3Int32 values[],
+                        size_t n) {
     ENTER(GET);
     return (fmi3Status)lw_get_int32(instance, vr, nvr, values, n);
 }
 
-fmi3Status fmi3SetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, const fmi3Int32 values[], size_t n) {
+fmi3Status fmi3SetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, const fmi3Int32 values[],
+                        size_t n) {
     ENTER(SET);
     return (fmi3Status)lw_set_int32(instance, vr, nvr, values, n);
 }
 
 /* There are no variables of the other types; a list without any is fine. */
-#define NO_VARIABLES(type, ...)                                                                          \
-    fmi3Status type(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, __VA_ARGS__) {            \
-        ENTER(GET);                                                                                      \
-        (void)vr;                                                                                        \
-        return nvr ? unsupported(instance, "a model without variables of that type") : fmi3OK;           \
+#define NO_VARIABLES(function, unused, ...)                                                                  \
+    fmi3Status function(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, __VA_ARGS__) {            \
+        ENTER(GET);                                                                                          \
+        (void)vr, unused;                                                                                    \
+        return nvr ? unsupported(instance, "a model without variables of that type") : fmi3OK;               \
     }
-#define UNUSED __attribute__((unused))
-#define NO_ACCESS(type)                                                                                  \
-    NO_VARIABLES(fmi3Get##type, UNUSED fmi3##type values[], UNUSED size_t n)                             \
-    NO_VARIABLES(fmi3Set##type, UNUSED const fmi3##type values[], UNUSED size_t n)
+#define NO_ACCESS(type)                                                                                      \
+    NO_VARIABLES(fmi3Get##type, ((void)values, (void)n), fmi3##type values[], size_t n)                      \
+    NO_VARIABLES(fmi3Set##type, ((void)values, (void)n), const fmi3##type values[], size_t n)
 NO_ACCESS(Float32)
 NO_ACCESS(Int8)
 NO_ACCESS(UInt8)
@@ -151,19 +169,24 @@ NO_ACCESS(Int64)
 NO_ACCESS(UInt64)
 NO_ACCESS(Boolean)
 NO_ACCESS(String)
-NO_VARIABLES(fmi3GetBinary, UNUSED size_t sizes[], UNUSED fmi3Binary values[], UNUSED size_t n)
-NO_VARIABLES(fmi3SetBinary, UNUSED const size_t sizes[], UNUSED const fmi3Binary values[], UNUSED size_t n)
-NO_VARIABLES(fmi3GetClock, UNUSED fmi3Clock values[])
-NO_VARIABLES(fmi3SetClock, UNUSED const fmi3Clock values[])
-NO_VARIABLES(fmi3GetIntervalDecimal, UNUSED fmi3Float64 intervals[], UNUSED fmi3IntervalQualifier qualifiers[])
-NO_VARIABLES(fmi3GetIntervalFraction, UNUSED fmi3UInt64 counters[], UNUSED fmi3UInt64 resolutions[],
-             UNUSED fmi3IntervalQualifier qualifiers[])
-NO_VARIABLES(fmi3GetShiftDecimal, UNUSED fmi3Float64 shifts[])
-NO_VARIABLES(fmi3GetShiftFraction, UNUSED fmi3UInt64 counters[], UNUSED fmi3UInt64 resolutions[])
-NO_VARIABLES(fmi3SetIntervalDecimal, UNUSED const fmi3Float64 intervals[])
-NO_VARIABLES(fmi3SetIntervalFraction, UNUSED const fmi3UInt64 counters[], UNUSED const fmi3UInt64 resolutions[])
-NO_VARIABLES(fmi3SetShiftDecimal, UNUSED const fmi3Float64 shifts[])
-NO_VARIABLES(fmi3SetShiftFraction, UNUSED const fmi3UInt64 counters[], UNUSED const fmi3UInt64 resolutions[])
+NO_VARIABLES(fmi3GetBinary, ((void)sizes, (void)values, (void)n), size_t sizes[], fmi3Binary values[],
+             size_t n)
+NO_VARIABLES(fmi3SetBinary, ((void)sizes, (void)values, (void)n), const size_t sizes[],
+             const fmi3Binary values[], size_t n)
+NO_VARIABLES(fmi3GetClock, ((void)values), fmi3Clock values[])
+NO_VARIABLES(fmi3SetClock, ((void)values), const fmi3Clock values[])
+NO_VARIABLES(fmi3GetIntervalDecimal, ((void)intervals, (void)kinds), fmi3Float64 intervals[],
+             fmi3IntervalQualifier kinds[])
+NO_VARIABLES(fmi3GetIntervalFraction, ((void)counts, (void)units, (void)kinds), fmi3UInt64 counts[],
+             fmi3UInt64 units[], fmi3IntervalQualifier kinds[])
+NO_VARIABLES(fmi3GetShiftDecimal, ((void)shifts), fmi3Float64 shifts[])
+NO_VARIABLES(fmi3GetShiftFraction, ((void)counts, (void)units), fmi3UInt64 counts[], fmi3UInt64 units[])
+NO_VARIABLES(fmi3SetIntervalDecimal, ((void)intervals), const fmi3Float64 intervals[])
+NO_VARIABLES(fmi3SetIntervalFraction, ((void)counts, (void)units), const fmi3UInt64 counts[],
+             const fmi3UInt64 units[])
+NO_VARIABLES(fmi3SetShiftDecimal, ((void)shifts), const fmi3Float64 shifts[])
+NO_VARIABLES(fmi3SetShiftFraction, ((void)counts, (void)units), const fmi3UInt64 counts[],
+             const fmi3UInt64 units[])
 
 /* Dependencies are those of the model description, for whole variables. */
 fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance c, fmi3ValueReference vr, size_t *n) {
@@ -172,11 +195,12 @@ fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance c, fmi3ValueReferenc
     return unsupported(instance, "dependencies from the model description (none per element)");
 }
 
-fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference dependent, size_t dependent_elements[],
-                                       fmi3ValueReference independents[], size_t independent_elements[],
-                                       fmi3DependencyKind kinds[], size_t n) {
+fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference dependent,
+                                       size_t dependent_elements[], fmi3ValueReference independents[],
+                                       size_t independent_elements[], fmi3DependencyKind kinds[], size_t n) {
     ENTER(UNSUPPORTED);
-    (void)dependent, (void)dependent_elements, (void)independents, (void)independent_elements, (void)kinds, (void)n;
+    (void)dependent, (void)dependent_elements, (void)independents, (void)independent_elements, (void)kinds,
+        (void)n;
     return unsupported(instance, "dependencies from the model description (none per element)");
 }
 
@@ -213,16 +237,18 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_
 }
 
 fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknown[], size_t n_unknown,
-                                        const fmi3ValueReference known[], size_t n_known, const fmi3Float64 seed[],
-                                        size_t n_seed, fmi3Float64 sensitivity[], size_t n_sensitivity) {
+                                        const fmi3ValueReference known[], size_t n_known,
+                                        const fmi3Float64 seed[], size_t n_seed, fmi3Float64 sensitivity[],
+                                        size_t n_sensitivity) {
     ENTER(DERIVATIVE);
     lw_variables unknowns = {unknown, n_unknown, n_sensitivity}, knowns = {known, n_known, n_seed};
     return (fmi3Status)lw_directional_derivative(instance, unknowns, knowns, seed, sensitivity);
 }
 
 fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unknown[], size_t n_unknown,
-                                    const fmi3ValueReference known[], size_t n_known, const fmi3Float64 seed[],
-                                    size_t n_seed, fmi3Float64 sensitivity[], size_t n_sensitivity) {
+                                    const fmi3ValueReference known[], size_t n_known,
+                                    const fmi3Float64 seed[], size_t n_seed, fmi3Float64 sensitivity[],
+                                    size_t n_sensitivity) {
     ENTER(DERIVATIVE);
     lw_variables unknowns = {unknown, n_unknown, n_seed}, knowns = {known, n_known, n_sensitivity};
     return (fmi3Status)lw_adjoint_derivative(instance, unknowns, knowns, seed, sensitivity);
@@ -249,7 +275,8 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *need_update, fm
                                     fmi3Boolean *nominals_changed, fmi3Boolean *values_changed,
                                     fmi3Boolean *next_event_defined, fmi3Float64 *next_event) {
     ENTER(DISCRETE_STATES);
-    if (!need_update || !terminate || !nominals_changed || !values_changed || !next_event_defined || !next_event)
+    if (!need_update || !terminate || !nominals_changed || !values_changed || !next_event_defined ||
+        !next_event)
         return (fmi3Status)lw_missing(instance, "one of the results");
     *need_update = *terminate = *nominals_changed = *values_changed = *next_event_defined = false;
     *next_event = 0.0;
@@ -268,7 +295,8 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean no_set_state_
                                        fmi3Boolean *enter_event_mode, fmi3Boolean *terminate) {
     ENTER(COMPLETED_STEP);
     (void)no_set_state_before;
-    if (!enter_event_mode || !terminate) return (fmi3Status)lw_missing(instance, "enterEventMode or terminateSimulation");
+    if (!enter_event_mode || !terminate)
+        return (fmi3Status)lw_missing(instance, "enterEventMode or terminateSimulation");
     *enter_event_mode = *terminate = false;
     lw_part_accept(instance);
     return fmi3OK;
@@ -328,8 +356,8 @@ fmi3Status fmi3EnterStepMode(fmi3Instance c) {
     return unsupported(instance, "Step Mode after initialization (there is no Event Mode)");
 }
 
-fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, const fmi3Int32 orders[],
-                                    fmi3Float64 values[], size_t n) {
+fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr,
+                                    const fmi3Int32 orders[], fmi3Float64 values[], size_t n) {
     ENTER(OUTPUT_DERIVATIVES);
     return (fmi3Status)lw_get_output_derivatives(instance, vr, nvr, orders, values, n);
 }

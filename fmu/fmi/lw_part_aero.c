@@ -16,6 +16,10 @@ struct lw_part {
     int32_t *body; /* (n) 0 ... n - 1 */
 };
 
+/* Index of the first value of a section; the values themselves. */
+#define FIRST(name) (instance->part->first[LW_AERO_##name])
+#define AT(name) (instance->values + FIRST(name))
+
 /* ---- layout ---- */
 
 #define COUNT(name, size) count += (size_t)(size);
@@ -66,17 +70,15 @@ void lw_part_restart(lw_instance *instance) {
     memcpy(instance->store, lw_fmu_theta, lw_part_memory() * sizeof(double));
 }
 
-uint32_t lw_part_first(const lw_instance *instance, unsigned section) { return instance->part->first[section]; }
+uint32_t lw_part_first(const lw_instance *instance, unsigned section) {
+    return instance->part->first[section];
+}
 
 uint32_t lw_part_states(const lw_instance *instance) { return (void)instance, 0; }
 
 uint32_t lw_part_derivatives(const lw_instance *instance, unsigned *groups) {
     *groups = 0;
     return (void)instance, 0;
-}
-
-static double *section(const lw_instance *instance, unsigned number) {
-    return instance->values + instance->part->first[number];
 }
 
 /* ---- parameters ---- */
@@ -97,11 +99,11 @@ int lw_part_configure(lw_instance *instance) {
     if (check_sign(instance, LW_AERO_DENSITY, 1) || check_sign(instance, LW_AERO_LENGTH, 0) ||
         check_sign(instance, LW_AERO_SPAN, 0))
         return LW_FMI_ERROR;
-    part->plates.density = *section(instance, LW_AERO_DENSITY);
-    memcpy(part->plates.wind.uniform, section(instance, LW_AERO_WIND), sizeof part->plates.wind.uniform);
+    part->plates.density = *AT(DENSITY);
+    memcpy(part->plates.wind.uniform, AT(WIND), sizeof part->plates.wind.uniform);
     for (int32_t i = 0; i < lw_fmu_n; ++i) {
-        part->size[2 * i] = section(instance, LW_AERO_LENGTH)[i];
-        part->size[2 * i + 1] = section(instance, LW_AERO_SPAN)[i];
+        part->size[2 * i] = AT(LENGTH)[i];
+        part->size[2 * i + 1] = AT(SPAN)[i];
     }
     return LW_FMI_OK;
 }
@@ -109,8 +111,7 @@ int lw_part_configure(lw_instance *instance) {
 /* ---- outputs ---- */
 
 static lw_motion motion(const lw_instance *instance) {
-    lw_motion now = {section(instance, LW_AERO_POSITION), section(instance, LW_AERO_ORIENTATION),
-                     section(instance, LW_AERO_LINEAR), section(instance, LW_AERO_ANGULAR)};
+    lw_motion now = {AT(POSITION), AT(ORIENTATION), AT(LINEAR), AT(ANGULAR)};
     return now;
 }
 
@@ -119,15 +120,14 @@ unsigned lw_part_group(unsigned number) { return (void)number, WRENCH; }
 int lw_part_update(lw_instance *instance, unsigned groups) {
     const lw_part *part = instance->part;
     lw_motion now = motion(instance);
-    lw_wrench wrench = {section(instance, LW_AERO_FORCE), section(instance, LW_AERO_TORQUE),
-                        section(instance, LW_AERO_ADDED_INERTIA)};
+    lw_wrench wrench = {AT(FORCE), AT(TORQUE), AT(ADDED_INERTIA)};
     int field = lw_fmu_aero_model == LW_AERO_FIELD;
     (void)groups;
     int status = field ? lw_field_evaluate(&part->field, instance->time, &now, instance->store, &wrench)
                        : lw_plates_evaluate(&part->plates, instance->time, &now, &wrench);
     if (!status) return LW_FMI_OK;
     int body = field ? (status - 1) / 6 : status - 1;
-    return lw_report(instance, LW_FMI_DISCARD, "Expected a finite wrench on body %d but was another at t = %.9g s.",
+    return lw_report(instance, LW_FMI_DISCARD, "Expected a finite wrench on body %d but was none at %.9g s.",
                      body, instance->time);
 }
 
@@ -156,9 +156,10 @@ int lw_part_set_input_derivative(lw_instance *instance, uint32_t index, int32_t 
 
 /* ---- scales of differences ---- */
 
-static double row_norm(const lw_instance *instance, unsigned number, uint32_t row, const double *less) {
-    lw_vec3 v = lw_load3(section(instance, number) + 3 * row);
-    return lw_norm(less ? lw_sub(v, lw_load3(less)) : v);
+static double norm(const double *row) { return lw_norm(lw_load3(row)); }
+
+static double airspeed(const lw_instance *instance, const double *velocity) {
+    return lw_norm(lw_sub(lw_load3(velocity), lw_load3(AT(WIND))));
 }
 
 /* A force law turns with the direction of the air: speeds vary by what they are. */
@@ -168,11 +169,9 @@ double lw_part_scale(const lw_instance *instance, const lw_fmu_variable *variabl
     switch (variable->section) {
     case LW_AERO_POSITION:
     case LW_AERO_ORIENTATION: return 1.0;
-    case LW_AERO_LINEAR:
-        scale = row_norm(instance, LW_AERO_LINEAR, place / 3, section(instance, LW_AERO_WIND));
-        break;
-    case LW_AERO_ANGULAR: scale = row_norm(instance, LW_AERO_ANGULAR, place / 3, NULL); break;
-    case LW_AERO_WIND: scale = row_norm(instance, LW_AERO_WIND, 0, NULL); break;
+    case LW_AERO_LINEAR: scale = airspeed(instance, AT(LINEAR) + place / 3 * 3); break;
+    case LW_AERO_ANGULAR: scale = norm(AT(ANGULAR) + place / 3 * 3); break;
+    case LW_AERO_WIND: scale = norm(AT(WIND)); break;
     default: break;
     }
     return scale > 0.0 ? scale : 1.0;

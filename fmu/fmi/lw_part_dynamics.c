@@ -16,6 +16,10 @@ struct lw_part {
     const double *added; /* added inertia, NULL where it is zero */
 };
 
+/* Index of the first value of a section; the values themselves. */
+#define FIRST(name) (instance->part->first[LW_DYNAMICS_##name])
+#define AT(name) (instance->values + FIRST(name))
+
 /* ---- layout ---- */
 
 #define COUNT(name, size) count += (size_t)(size);
@@ -63,52 +67,51 @@ void lw_part_create(lw_instance *instance) {
 
 void lw_part_restart(lw_instance *instance) { memset(instance->store, 0, lw_part_memory() * sizeof(double)); }
 
-uint32_t lw_part_first(const lw_instance *instance, unsigned section) { return instance->part->first[section]; }
+uint32_t lw_part_first(const lw_instance *instance, unsigned section) {
+    return instance->part->first[section];
+}
 
-uint32_t lw_part_states(const lw_instance *instance) { return instance->part->first[LW_DYNAMICS_Q]; }
+uint32_t lw_part_states(const lw_instance *instance) { return FIRST(Q); }
 
 uint32_t lw_part_derivatives(const lw_instance *instance, unsigned *groups) {
     *groups = RATE | ACCELERATION;
-    return instance->part->first[LW_DYNAMICS_DER_Q];
-}
-
-static double *section(const lw_instance *instance, unsigned number) {
-    return instance->values + instance->part->first[number];
+    return FIRST(DER_Q);
 }
 
 /* ---- parameters ---- */
 
 static int refuse(const lw_instance *instance, uint32_t index, const char *expected) {
-    return lw_report(instance, LW_FMI_ERROR, "%s: Expected %s but was %.17g.", lw_name_at(LW_TYPE_FLOAT64, index),
-                     expected, instance->values[index]);
+    return lw_report(instance, LW_FMI_ERROR, "%s: Expected %s but was %.17g.",
+                     lw_name_at(LW_TYPE_FLOAT64, index), expected, instance->values[index]);
 }
 
 /* Name the parameter that the core objects to. */
 static int refuse_table(const lw_instance *instance, int status, const lw_fault *fault) {
-    const uint32_t *first = instance->part->first, row = (uint32_t)fault->item;
-    if (status == LW_BAD_MASS) return refuse(instance, first[LW_DYNAMICS_MASS] + row, "a mass of zero or more");
-    if (status == LW_BAD_INERTIA) {
-        uint32_t index = first[LW_DYNAMICS_INERTIA] + 6 * row;
-        for (int k = 0; k < 2 && instance->values[index] >= 0.0; ++k) ++index;
-        return refuse(instance, index, "a moment of inertia of zero or more");
+    uint32_t row = (uint32_t)fault->item, inertia = FIRST(INERTIA) + 6 * row;
+    switch (status) {
+    case LW_BAD_MASS: return refuse(instance, FIRST(MASS) + row, "a mass of zero or more");
+    case LW_BAD_INERTIA:
+        for (int k = 0; k < 2 && instance->values[inertia] >= 0.0; ++k) ++inertia;
+        return refuse(instance, inertia, "a moment of inertia of zero or more");
+    case LW_BAD_REST:
+        return refuse(instance, FIRST(REST) + (uint32_t)lw_fmu_q_index[row], "a rest with a rotation");
+    default:
+        return lw_report(instance, LW_FMI_ERROR, "Expected a mechanism but was trouble %d in row %d.", status,
+                         fault->item);
     }
-    if (status == LW_BAD_REST)
-        return refuse(instance, first[LW_DYNAMICS_REST] + (uint32_t)lw_fmu_q_index[row], "a rest with a rotation");
-    return lw_report(instance, LW_FMI_ERROR, "Expected a mechanism but was an error (%d) in row %d of its tables.",
-                     status, fault->item);
 }
 
 static int check_solver(const lw_instance *instance) {
     int32_t integrator = instance->integers[LW_INTEGRATOR], substeps = instance->integers[LW_SUBSTEPS];
-    double rtol = *section(instance, LW_DYNAMICS_RTOL), atol = *section(instance, LW_DYNAMICS_ATOL);
+    double rtol = *AT(RTOL), atol = *AT(ATOL);
     if (integrator < LW_EULER || integrator > LW_DOPRI5)
-        return lw_report(instance, LW_FMI_ERROR, "%s: Expected 0 (euler), 1 (semi-implicit euler), 2 (rk4) or 3 "
-                         "(dopri5) but was %d.", lw_name_at(LW_TYPE_INT32, LW_INTEGRATOR), integrator);
+        return lw_report(instance, LW_FMI_ERROR, "%s: Expected 0 euler, 1 semi-implicit euler, 2 rk4 or "
+                         "3 dopri5 but was %d.", lw_name_at(LW_TYPE_INT32, LW_INTEGRATOR), integrator);
     if (substeps < 1)
         return lw_report(instance, LW_FMI_ERROR, "%s: Expected at least 1 but was %d.",
                          lw_name_at(LW_TYPE_INT32, LW_SUBSTEPS), substeps);
-    if (!(rtol >= 0.0)) return refuse(instance, instance->part->first[LW_DYNAMICS_RTOL], "zero or more");
-    if (!(atol > 0.0)) return refuse(instance, instance->part->first[LW_DYNAMICS_ATOL], "more than zero");
+    if (!(rtol >= 0.0)) return refuse(instance, FIRST(RTOL), "zero or more");
+    if (!(atol > 0.0)) return refuse(instance, FIRST(ATOL), "more than zero");
     return LW_FMI_OK;
 }
 
@@ -119,12 +122,10 @@ int lw_part_configure(lw_instance *instance) {
         .n = lw_fmu_n, .nq = lw_fmu_nq, .nv = lw_fmu_nv,
         .parent = lw_fmu_parent, .order = lw_fmu_order, .joint_type = lw_fmu_joint_type,
         .q_index = lw_fmu_q_index, .v_index = lw_fmu_v_index,
-        .parent_point = section(instance, LW_DYNAMICS_PARENT_POINT), .parent_rotation = lw_fmu_parent_rotation,
-        .child_point = section(instance, LW_DYNAMICS_CHILD_POINT), .child_rotation = lw_fmu_child_rotation,
-        .mass = section(instance, LW_DYNAMICS_MASS), .inertia = section(instance, LW_DYNAMICS_INERTIA),
-        .gravity = section(instance, LW_DYNAMICS_GRAVITY),
-        .stiffness = section(instance, LW_DYNAMICS_STIFFNESS),
-        .damping = section(instance, LW_DYNAMICS_DAMPING), .rest = section(instance, LW_DYNAMICS_REST)};
+        .parent_point = AT(PARENT_POINT), .parent_rotation = lw_fmu_parent_rotation,
+        .child_point = AT(CHILD_POINT), .child_rotation = lw_fmu_child_rotation,
+        .mass = AT(MASS), .inertia = AT(INERTIA), .gravity = AT(GRAVITY),
+        .stiffness = AT(STIFFNESS), .damping = AT(DAMPING), .rest = AT(REST)};
     if (status) return status;
     status = lw_multibody_init(instance->part->multibody, &tables, &fault);
     return status ? refuse_table(instance, status, &fault) : LW_FMI_OK;
@@ -135,7 +136,7 @@ int lw_part_configure(lw_instance *instance) {
 static int discard(const lw_instance *instance, int status, const lw_fault *fault) {
     const char *expected = "numbers that stay finite", *was = "an overflow";
     if (status == LW_SINGULAR) expected = "a joint with inertia to move", was = "a massless body";
-    if (status == LW_STEP_UNDERFLOW) expected = "a substep that meets the tolerance", was = "one of no length";
+    if (status == LW_STEP_UNDERFLOW) expected = "a substep that meets the tolerance", was = "none";
     return lw_report(instance, LW_FMI_DISCARD, "Expected %s but was %s at body %d, %.9g s into the step.",
                      expected, was, fault->item, fault->time);
 }
@@ -144,7 +145,7 @@ static int discard(const lw_instance *instance, int status, const lw_fault *faul
 
 /* Force and torque `dt` [s] into the step, as the core takes them: (n, 6). */
 static void pack_wrench(const lw_instance *instance, double dt, double *wrench) {
-    const double *value = section(instance, LW_DYNAMICS_FORCE), *rate = instance->store + RATES;
+    const double *value = AT(FORCE), *rate = instance->store + RATES;
     int order = (int)instance->store[ORDER];
     size_t size = forces();
     for (size_t i = 0; i < size; ++i) {
@@ -161,7 +162,7 @@ static void pack_wrench(const lw_instance *instance, double dt, double *wrench) 
 /* Where the added inertia is, if it is not zero. */
 static const double *find_added(lw_instance *instance) {
     if (!(instance->stale & LW_STALE_INPUTS)) return instance->part->added;
-    const double *added = section(instance, LW_DYNAMICS_ADDED_INERTIA);
+    const double *added = AT(ADDED_INERTIA);
     instance->part->added = NULL;
     for (size_t k = 0; k < 6 * forces(); ++k)
         if (added[k] != 0.0) instance->part->added = added;
@@ -170,7 +171,7 @@ static const double *find_added(lw_instance *instance) {
 }
 
 int lw_part_set_input_derivative(lw_instance *instance, uint32_t index, int32_t order, double value) {
-    uint32_t first = instance->part->first[LW_DYNAMICS_FORCE];
+    uint32_t first = FIRST(FORCE);
     double *memory = instance->store;
     if (index - first >= forces()) return 0;
     memory[RATES + (size_t)(order - 1) * forces() + (index - first)] = value;
@@ -195,18 +196,17 @@ unsigned lw_part_group(unsigned number) {
 
 static void load_state(lw_instance *instance) {
     lw_part *part = instance->part;
-    memcpy(part->state, section(instance, LW_DYNAMICS_Q), lw_state_size() * sizeof(double));
+    memcpy(part->state, AT(Q), lw_state_size() * sizeof(double));
     part->state[lw_state_size()] = instance->store[PROPOSED];
 }
 
 static int update_motion(lw_instance *instance) {
-    double *orientation = section(instance, LW_DYNAMICS_ORIENTATION);
-    lw_multibody_motion(instance->part->multibody, instance->part->state, section(instance, LW_DYNAMICS_POSITION),
-                        orientation, section(instance, LW_DYNAMICS_LINEAR), section(instance, LW_DYNAMICS_ANGULAR));
+    const lw_part *part = instance->part;
+    const double *orientation = AT(ORIENTATION);
+    lw_multibody_motion(part->multibody, part->state, AT(POSITION), AT(ORIENTATION), AT(LINEAR), AT(ANGULAR));
     for (int i = 0; i < lw_fmu_n; ++i)
         if (!isfinite(orientation[4 * i]))
-            return lw_report(instance, LW_FMI_DISCARD, "Expected a rotation of body %d but was a quaternion of no "
-                             "length.", i);
+            return lw_report(instance, LW_FMI_DISCARD, "Expected a rotation of body %d but was none.", i);
     return LW_FMI_OK;
 }
 
@@ -224,11 +224,9 @@ static int update_acceleration(lw_instance *instance) {
     int status = lw_multibody_evaluate(part->multibody, part->state, part->wrench, find_added(instance),
                                        part->joint, part->acceleration, part->reaction, part->total, &fault);
     if (status) return discard(instance, status, &fault);
-    memcpy(section(instance, LW_DYNAMICS_DER_V), part->joint, (size_t)lw_fmu_nv * sizeof(double));
-    split(part->acceleration, section(instance, LW_DYNAMICS_LINEAR_ACCELERATION),
-          section(instance, LW_DYNAMICS_ANGULAR_ACCELERATION));
-    split(part->reaction, section(instance, LW_DYNAMICS_REACTION_FORCE),
-          section(instance, LW_DYNAMICS_REACTION_TORQUE));
+    memcpy(AT(DER_V), part->joint, (size_t)lw_fmu_nv * sizeof(double));
+    split(part->acceleration, AT(LINEAR_ACCELERATION), AT(ANGULAR_ACCELERATION));
+    split(part->reaction, AT(REACTION_FORCE), AT(REACTION_TORQUE));
     return LW_FMI_OK;
 }
 
@@ -237,10 +235,9 @@ int lw_part_update(lw_instance *instance, unsigned groups) {
     int status = LW_FMI_OK;
     load_state(instance);
     if (groups & RATE)
-        lw_coordinate_rate(part->multibody, part->state, part->state + lw_fmu_nq, section(instance, LW_DYNAMICS_DER_Q));
+        lw_coordinate_rate(part->multibody, part->state, part->state + lw_fmu_nq, AT(DER_Q));
     if (groups & ENERGY)
-        lw_multibody_energy(part->multibody, part->state, section(instance, LW_DYNAMICS_KINETIC_ENERGY),
-                            section(instance, LW_DYNAMICS_POTENTIAL_ENERGY));
+        lw_multibody_energy(part->multibody, part->state, AT(KINETIC_ENERGY), AT(POTENTIAL_ENERGY));
     if (groups & MOTION) status = update_motion(instance);
     if (!status && groups & ACCELERATION) status = update_acceleration(instance);
     return status;
@@ -281,11 +278,11 @@ int lw_part_advance(lw_instance *instance, double h, int32_t pieces) {
         .state = part->state, .h = h, .nodes = nodes, .wrenches = part->wrench, .count = order + 1,
         .added_inertia = find_added(instance), .integrator = instance->integers[LW_INTEGRATOR],
         .substeps = pieces > 1 ? 1 : instance->integers[LW_SUBSTEPS],
-        .rtol = *section(instance, LW_DYNAMICS_RTOL), .atol = *section(instance, LW_DYNAMICS_ATOL),
+        .rtol = *AT(RTOL), .atol = *AT(ATOL),
         .next = part->state, .work = work, .fault = &fault};
     int status = lw_multibody_advance(part->multibody, &step);
     if (status) return discard(instance, status, &fault);
-    memcpy(section(instance, LW_DYNAMICS_Q), part->state, lw_state_size() * sizeof(double));
+    memcpy(AT(Q), part->state, lw_state_size() * sizeof(double));
     instance->store[PROPOSED] = part->state[lw_state_size()];
     if (order) memset(instance->store + ORDER, 0, (lw_part_memory() - ORDER) * sizeof(double));
     return LW_FMI_OK;
@@ -297,35 +294,41 @@ void lw_part_accept(lw_instance *instance) { (void)instance; }
 
 /* What resists along one of the six directions of a body: mass, or a moment of inertia. */
 static double resistance(const lw_instance *instance, uint32_t body, uint32_t direction) {
-    const double *mass = section(instance, LW_DYNAMICS_MASS) + body;
-    const double *inertia = section(instance, LW_DYNAMICS_INERTIA) + 6 * body;
-    const double *added = section(instance, LW_DYNAMICS_ADDED_INERTIA) + 36 * body;
+    const double *mass = AT(MASS) + body;
+    const double *inertia = AT(INERTIA) + 6 * body;
+    const double *added = AT(ADDED_INERTIA) + 36 * body;
     double largest = fmax(inertia[0], fmax(inertia[1], inertia[2]));
     return (direction < 3 ? *mass : largest) + fabs(added[7 * direction]);
 }
 
-static double length_scale(const lw_instance *instance, unsigned number, uint32_t body) {
-    lw_vec3 point = lw_load3(section(instance, number) + 3 * body);
+static double length_scale(const lw_instance *instance, const double *points, uint32_t body) {
+    lw_vec3 point = lw_load3(points + 3 * body);
     double mass = resistance(instance, body, 0), inertia = resistance(instance, body, 3);
     double sum = lw_norm(point) + (mass > 0.0 ? sqrt(inertia / mass) : 0.0);
     return sum > 0.0 ? sum : 1.0;
 }
 
 double lw_part_scale(const lw_instance *instance, const lw_fmu_variable *variable, uint32_t index) {
-    uint32_t place = index - instance->part->first[variable->section];
-    double size = fabs(instance->values[index]), scale = 0.0;
+    uint32_t place = index - instance->part->first[variable->section], body = place / 36;
+    double size = fabs(instance->values[index]), scale = size;
     switch (variable->section) {
-    case LW_DYNAMICS_Q: return 1.0;
+    case LW_DYNAMICS_Q:
+    case LW_DYNAMICS_REST: return 1.0;
     case LW_DYNAMICS_V:
     case LW_DYNAMICS_FORCE:
     case LW_DYNAMICS_TORQUE:
-    case LW_DYNAMICS_GRAVITY: return 100.0 * fmax(1.0, size); /* no truncation */
-    case LW_DYNAMICS_PARENT_POINT:
-    case LW_DYNAMICS_CHILD_POINT: return length_scale(instance, variable->section, place / 3);
-    case LW_DYNAMICS_ADDED_INERTIA:
-        scale = sqrt(resistance(instance, place / 36, place % 36 / 6) * resistance(instance, place / 36, place % 6));
+    case LW_DYNAMICS_GRAVITY:
+    case LW_DYNAMICS_STIFFNESS:
+    case LW_DYNAMICS_DAMPING: return 100.0 * fmax(1.0, size); /* no truncation */
+    case LW_DYNAMICS_PARENT_POINT: return length_scale(instance, AT(PARENT_POINT), place / 3);
+    case LW_DYNAMICS_CHILD_POINT: return length_scale(instance, AT(CHILD_POINT), place / 3);
+    case LW_DYNAMICS_INERTIA:
+        if (place % 6 > 2) scale = resistance(instance, place / 6, 3);
         break;
-    default: scale = size;
+    case LW_DYNAMICS_ADDED_INERTIA:
+        scale = sqrt(resistance(instance, body, place % 36 / 6) * resistance(instance, body, place % 6));
+        break;
+    default: break;
     }
     return scale > 0.0 ? scale : 1.0;
 }

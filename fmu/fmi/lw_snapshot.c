@@ -119,9 +119,9 @@ static uint64_t model_hash(void) {
 
 /* CRC-32 of IEEE 802.3, four bits at a time. */
 static uint32_t crc(uint32_t sum, const unsigned char *bytes, size_t count) {
-    static const uint32_t table[16] = {
-        0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4, 0x4db26158, 0x5005713c,
-        0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c, 0x9b64c2b0, 0x86d3d2d4, 0xa00ae278, 0xbdbdf21c};
+    static const uint32_t table[16] = {0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4,
+                                       0x4db26158, 0x5005713c, 0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c,
+                                       0x9b64c2b0, 0x86d3d2d4, 0xa00ae278, 0xbdbdf21c};
     sum = ~sum;
     for (size_t i = 0; i < count; ++i) {
         sum ^= bytes[i];
@@ -175,7 +175,9 @@ static const char *flaw_of_bytes(const lw_instance *instance, const unsigned cha
     return NULL;
 }
 
-static int is_int32(double value) { return value >= -2147483648.0 && value <= 2147483647.0 && value == floor(value); }
+static int is_int32(double value) {
+    return value >= -2147483648.0 && value <= 2147483647.0 && value == floor(value);
+}
 
 static int is_mode(double value, int kind) {
     static const unsigned modes[] = {LW_INSTANTIATED, LW_INITIALIZATION, LW_TERMINATED};

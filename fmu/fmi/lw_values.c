@@ -41,7 +41,8 @@ static int check(const lw_instance *instance, const uint32_t *references, size_t
         if (!v) return LW_FMI_ERROR;
         if (writing && !(lw_settable[v->causality] & instance->mode))
             return lw_report(instance, LW_FMI_ERROR,
-                             "%s: Expected a variable that may be set in this state but was another.", v->name);
+                             "%s: Expected a variable that may be set in this state but was another.",
+                             v->name);
         found += v->size;
     }
     if (found == count) return LW_FMI_OK;
@@ -66,7 +67,8 @@ int lw_update(lw_instance *instance, unsigned groups) {
 
 /* ---- Float64 ---- */
 
-int lw_get_float64(lw_instance *instance, const uint32_t *references, size_t n, double *values, size_t count) {
+int lw_get_float64(lw_instance *instance, const uint32_t *references, size_t n, double *values,
+                   size_t count) {
     unsigned groups = 0;
     int status = check(instance, references, n, values, count, 0, 0);
     if (status) return status;
@@ -90,7 +92,8 @@ static int check_finite(const lw_instance *instance, const uint32_t *references,
     for (size_t k = 0; k < count; ++k, --left) {
         while (!left) v = &lw_fmu_variables[*references++], left = v->size;
         if (isfinite(values[k])) continue;
-        return lw_report(instance, LW_FMI_ERROR, "%s: Expected a finite number but was %g.", v->name, values[k]);
+        return lw_report(instance, LW_FMI_ERROR, "%s: Expected a finite number but was %g.", v->name,
+                         values[k]);
     }
     return LW_FMI_OK;
 }
@@ -142,8 +145,7 @@ static int check_count(const lw_instance *instance, const double *values, size_t
 
 int lw_get_states(lw_instance *instance, double *states, size_t count) {
     int status = check_count(instance, states, count);
-    if (!status && count)
-        memcpy(states, instance->values + lw_part_states(instance), count * sizeof(double));
+    if (!status && count) memcpy(states, instance->values + lw_part_states(instance), count * sizeof(double));
     return status;
 }
 
