@@ -4,7 +4,7 @@ static const double two_pi = 6.283185307179586476925286766559;
 
 /* Heading of the body's x axis about world z, on the branch nearest to the reference. The first column
  * of the rotation matrix is taken unnormalised, so that the quaternion's length does not matter. */
-static double heading(const double q[4], double reference) {
+static double heading(const lw_unaligned *q, double reference) {
     const double c = q[0] * q[0] + q[1] * q[1] - q[2] * q[2] - q[3] * q[3];
     const double s = 2.0 * (q[1] * q[2] + q[0] * q[3]);
     const double angle = atan2(s, c);

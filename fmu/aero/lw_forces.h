@@ -5,17 +5,19 @@
 #ifndef LW_FORCES_H
 #define LW_FORCES_H
 
+#include "lw_math.h"
+
 typedef struct {
-    const double *position;    /* (bodies, 3) [m] */
-    const double *orientation; /* (bodies, 4) unit quaternion (w, x, y, z), body to world */
-    const double *linear;      /* (bodies, 3) [m/s] */
-    const double *angular;     /* (bodies, 3) [rad/s] */
+    const lw_unaligned *position;    /* (bodies, 3) [m] */
+    const lw_unaligned *orientation; /* (bodies, 4) unit quaternion (w, x, y, z), body to world */
+    const lw_unaligned *linear;      /* (bodies, 3) [m/s] */
+    const lw_unaligned *angular;     /* (bodies, 3) [rad/s] */
 } lw_motion;
 
 typedef struct {
-    double *force;         /* (n, 3) [N] */
-    double *torque;        /* (n, 3) [N m] */
-    double *added_inertia; /* (n, 6, 6) body frame, force rows first; NULL where it is not wanted */
+    lw_unaligned *force;         /* (n, 3) [N] */
+    lw_unaligned *torque;        /* (n, 3) [N m] */
+    lw_unaligned *added_inertia; /* (n, 6, 6) body frame, force rows first; NULL where it is not wanted */
 } lw_wrench;
 
 #endif

@@ -75,8 +75,8 @@ static void add_added_mass(double mass, double inertia, lw_vec3 v, lw_vec3 omega
     torque->z -= v.x * p;
 }
 
-static int evaluate(const lw_plates *plates, int i, double t, const lw_motion *motion, double *force,
-                    double *torque) {
+static int evaluate(const lw_plates *plates, int i, double t, const lw_motion *motion,
+                    lw_unaligned *force, lw_unaligned *torque) {
     const int32_t b = plates->body[i];
     const double chord = plates->size[2 * i], span = plates->size[2 * i + 1];
     const lw_mat3 rotation = lw_quat_matrix(lw_load4(motion->orientation + 4 * b));
@@ -114,7 +114,7 @@ int lw_plates_evaluate(const lw_plates *plates, double t, const lw_motion *motio
         if (wrench->added_inertia) {
             const lw_added_mass added =
                 lw_plate_added_mass(plates->density, plates->size[2 * i], plates->size[2 * i + 1]);
-            double *a = wrench->added_inertia + 36 * i;
+            lw_unaligned *a = wrench->added_inertia + 36 * i;
             memset(a, 0, 36 * sizeof *a);
             a[1 * 6 + 1] = added.normal;
             a[5 * 6 + 5] = added.span;

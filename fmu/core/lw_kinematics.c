@@ -120,8 +120,8 @@ void lw_kinematics(lw_multibody *mb, const double *q, const double *v) {
     }
 }
 
-void lw_multibody_motion(lw_multibody *mb, const double *state, double *position, double *orientation,
-                         double *linear, double *angular) {
+void lw_multibody_motion(lw_multibody *mb, const double *state, lw_unaligned *position,
+                         lw_unaligned *orientation, lw_unaligned *linear, lw_unaligned *angular) {
     lw_kinematics(mb, state, state + mb->nq);
     for (int i = 0; i < mb->n; ++i) {
         const lw_link *l = &mb->link[i];
@@ -133,7 +133,8 @@ void lw_multibody_motion(lw_multibody *mb, const double *state, double *position
 }
 
 /* Distance of the joint's two points, without the directions in which the joint lets them part. */
-static double gap(const lw_link *l, int32_t parent_body, const double *position, const double *orientation) {
+static double gap(const lw_link *l, int32_t parent_body, const lw_unaligned *position,
+                  const lw_unaligned *orientation) {
     lw_mat3 child = lw_quat_matrix(lw_load4(orientation + 4 * l->body)), parent = identity;
     lw_vec3 hold = l->parent_point;
     if (parent_body >= 0) {
@@ -149,7 +150,8 @@ static double gap(const lw_link *l, int32_t parent_body, const double *position,
     return lw_norm(parted);
 }
 
-double lw_multibody_joint_gap(const lw_multibody *mb, const double *position, const double *orientation) {
+double lw_multibody_joint_gap(const lw_multibody *mb, const lw_unaligned *position,
+                              const lw_unaligned *orientation) {
     double largest = 0.0;
     for (int i = 0; i < mb->n; ++i) {
         const lw_link *l = &mb->link[i];

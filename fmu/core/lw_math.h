@@ -24,6 +24,9 @@
 #define LW_INLINE static inline
 #endif
 
+/* A double that may lie anywhere: the arrays inside a protobuf message are not aligned. */
+typedef double lw_unaligned __attribute__((aligned(1)));
+
 typedef struct { double x, y, z; } lw_vec3;
 typedef struct { double w, x, y, z; } lw_quat;
 /* Full matrix, named by row and column. */
@@ -37,8 +40,8 @@ LW_INLINE lw_vec3 lw_vec(double x, double y, double z) {
     lw_vec3 v = {x, y, z};
     return v;
 }
-LW_INLINE lw_vec3 lw_load3(const double *p) { return lw_vec(p[0], p[1], p[2]); }
-LW_INLINE void lw_store3(double *p, lw_vec3 v) { p[0] = v.x; p[1] = v.y; p[2] = v.z; }
+LW_INLINE lw_vec3 lw_load3(const lw_unaligned *p) { return lw_vec(p[0], p[1], p[2]); }
+LW_INLINE void lw_store3(lw_unaligned *p, lw_vec3 v) { p[0] = v.x; p[1] = v.y; p[2] = v.z; }
 LW_INLINE lw_vec3 lw_add(lw_vec3 a, lw_vec3 b) { return lw_vec(a.x + b.x, a.y + b.y, a.z + b.z); }
 LW_INLINE lw_vec3 lw_sub(lw_vec3 a, lw_vec3 b) { return lw_vec(a.x - b.x, a.y - b.y, a.z - b.z); }
 LW_INLINE lw_vec3 lw_neg(lw_vec3 a) { return lw_vec(-a.x, -a.y, -a.z); }
@@ -55,8 +58,8 @@ LW_INLINE lw_quat lw_quat_of(double w, double x, double y, double z) {
     lw_quat q = {w, x, y, z};
     return q;
 }
-LW_INLINE lw_quat lw_load4(const double *p) { return lw_quat_of(p[0], p[1], p[2], p[3]); }
-LW_INLINE void lw_store4(double *p, lw_quat q) { p[0] = q.w; p[1] = q.x; p[2] = q.y; p[3] = q.z; }
+LW_INLINE lw_quat lw_load4(const lw_unaligned *p) { return lw_quat_of(p[0], p[1], p[2], p[3]); }
+LW_INLINE void lw_store4(lw_unaligned *p, lw_quat q) { p[0] = q.w; p[1] = q.x; p[2] = q.y; p[3] = q.z; }
 LW_INLINE lw_quat lw_quat_mul(lw_quat a, lw_quat b) {
     return lw_quat_of(a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z,
                       a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,

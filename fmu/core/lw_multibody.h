@@ -112,8 +112,8 @@ typedef struct {
 LW_API int lw_multibody_advance(lw_multibody *multibody, const lw_macro_step *step);
 
 /* Poses and twists of the bodies: position (n,3), orientation (n,4), linear (n,3), angular (n,3), in W. */
-LW_API void lw_multibody_motion(lw_multibody *multibody, const double *state, double *position,
-                                double *orientation, double *linear, double *angular);
+LW_API void lw_multibody_motion(lw_multibody *multibody, const double *state, lw_unaligned *position,
+                                lw_unaligned *orientation, lw_unaligned *linear, lw_unaligned *angular);
 
 /* Accelerations and reactions under `wrench` (n,6): joint_acceleration (nv), acceleration (n,6) linear
  * first, reaction (n,6) of parent on child at the joint's point on the child, total_wrench (n,6). */
@@ -127,8 +127,8 @@ LW_API void lw_multibody_energy(lw_multibody *multibody, const double *state, do
                                 double *potential);
 
 /* Largest distance [m] by which given poses violate a joint. */
-LW_API double lw_multibody_joint_gap(const lw_multibody *multibody, const double *position,
-                                     const double *orientation);
+LW_API double lw_multibody_joint_gap(const lw_multibody *multibody, const lw_unaligned *position,
+                                     const lw_unaligned *orientation);
 
 /* Evaluate the accelerations `repeats` times under zero wrench, for benchmarks. */
 LW_API int lw_multibody_repeat(lw_multibody *multibody, const double *state, int32_t repeats);
