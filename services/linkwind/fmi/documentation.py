@@ -1,0 +1,171 @@
+"""The pages in ``documentation/``: what is computed, how, and every variable."""
+
+from __future__ import annotations
+
+from html import escape
+
+from linkwind.fmi.part import Part
+from linkwind.fmi.variables import Variable
+
+_STYLE = """
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }
+table { border-collapse: collapse; } td, th { padding: .15rem .8rem .15rem 0; text-align: left; }
+th { border-bottom: 1px solid #8a949c; } td { border-bottom: 1px solid #e3e7ea; vertical-align: top; }
+.eq { font: italic 1.1em/1.6 Cambria, Georgia, serif; margin-left: 2rem; } figure { margin: 0; }
+code { font-size: .92em; }
+"""
+
+_DYNAMICS = """
+<h2>Equations</h2>
+<p>Rigid bodies in a tree of joints, in joint coordinates <i>q</i> and velocities <i>v</i>:</p>
+<p class="eq">q̇ = N(q) v,<br>
+M(q) v̇ + c(q, v) = −k (q − q<sub>rest</sub>) − d v + Σ J<sub>b</sub>(q)ᵀ (w<sub>b</sub> − A<sub>b</sub>
+a<sub>b</sub>)
+</p>
+<p>with the mass matrix M, Coriolis and gravity terms c, springs k and dampers d of the joints, and for
+each body b
+the wrench w<sub>b</sub> = (F, T) in the world at the centre of mass, the added inertia A<sub>b</sub>
+(6×6, in the
+body frame) and the acceleration a<sub>b</sub> = (a, alpha). They are solved by the articulated-body
+algorithm
+(R. Featherstone, Rigid Body Dynamics Algorithms, 2008, doi:10.1007/978-1-4899-7560-7), in a time
+proportional to
+the number of bodies.</p>
+<h2>Time steps</h2>
+<p>Co-Simulation: inputs are held over a communication step, unless their derivatives are given (FMI 2).
+The step
+is taken by <code>solver.integrator</code> (0 Euler, 1 semi-implicit Euler, 2 Runge–Kutta of order 4, 3
+Dormand–Prince
+with the tolerances <code>solver.rtol</code> and <code>solver.atol</code>) in
+<code>solver.substeps</code> equal parts.
+Model Exchange: the states are all q and v; there are no events.</p>
+"""
+
+_PLATE = """
+<h2>Equations</h2>
+<p>Each body is a thin flat plate of chord c (along x of its body frame), span s (along z) and normal
+along y, in a
+quasi-steady flow. With the velocity of the air relative to the plate, U = √(u² + w²), lift and drag
+follow from the
+angle of attack α, blended from attached to stalled flow at 14°; rotation adds lift and a moment; the
+added mass
+π ρ (c/2)² s along the normal and the added inertia π ρ (c/2)⁴ s/8 about the span act on the acceleration
+and are
+returned as the matrix A.</p>
+<p>Sources: H. Li, T. Goodwill, Z. J. Wang, L. Ristroph, J. Fluid Mech. 937, A6 (2022),
+doi:10.1017/jfm.2022.89;
+A. Andersen, U. Pesavento, Z. J. Wang, J. Fluid Mech. 541, 65 (2005), doi:10.1017/S002211200500594X.</p>
+"""
+
+
+def index(part: Part, picture: str, *, has_references: bool) -> bytes:
+    """Return ``index.html``, self-contained.
+
+    Args:
+        part: what is exported.
+        picture: of the mechanism, as SVG.
+        has_references: whether the FMU has reference results.
+    """
+    scenario = part.scenario
+    provider = part.provider
+    link = '<a href="fmi-ls-ref.html">Reference results</a> come with this FMU.'
+    checked = link if has_references else ""
+    equations = _DYNAMICS if provider is None else _PLATE if provider.model == "plate" else _field(part)
+    text = f"""<!DOCTYPE html>
+<html lang="en"><head><meta
+charset="utf-8"><title>{escape(part.identifier)}</title><style>{_STYLE}</style></head>
+<body>
+<h1>{escape(part.identifier)}</h1>
+<p>{escape(part.description)}</p>
+<figure>{picture}<figcaption>The mechanism at its start, seen along z.</figcaption></figure>
+<p>All values are in SI units. Vectors are in the world frame W at the centres of mass; orientations are
+unit
+quaternions (w, x, y, z), body to world. The default step is {scenario.coupling.step!r} s, the default end
+{scenario.time.end!r} s. {checked}</p>
+{equations}
+{_table("Parameters", part, "parameter")}
+{_table("Inputs", part, "input")}
+{_table("Outputs", part, "output")}
+{_bodies(part)}
+</body></html>
+"""
+    return text.encode()
+
+
+def references(part: Part) -> bytes:
+    """Return ``fmi-ls-ref.html``, about the reference results."""
+    text = f"""<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"><title>Reference
+results</title><style>{_STYLE}</style></head><body>
+<h1>Reference results of {escape(part.identifier)}</h1>
+<p><code>extra/org.fmi-standard.fmi-ls-ref</code> holds one experiment: inputs at communication points,
+and what
+follows from them by Co-Simulation with the default parameters. Each row of the inputs is set before the
+step that
+starts at its time, and held over the step; the results are read at the end of steps, before new inputs
+are set.
+They were computed without this FMU, by the library that it was exported from; on the same kind of
+processor an
+importer gets the same numbers to the last bit, elsewhere to some 1e-12.</p>
+<p>In Model Exchange, with the inputs held in the same way, they agree to the tolerance of the
+integrator.</p>
+</body></html>
+"""
+    return text.encode()
+
+
+def _field(part: Part) -> str:
+    """The expressions of a field, as the scenario states them."""
+    assert part.provider is not None
+    rows = []
+    for body in part.bodies:
+        expressions = part.provider.field.get(body)
+        if expressions is None:
+            continue
+        stated = [(f"{name}", text) for name, text in expressions.let.items()]
+        stated += [(name, getattr(expressions, name)) for name in ("fx", "fy", "fz", "tx", "ty", "tz")]
+        rows += [(body, name, text) for name, text in stated if text != "0"]
+    cells = "".join(
+        f"<tr><td>{escape(body)}</td><td>{escape(name)}</td><td><code>{escape(text)}</code></td></tr>"
+        for body, name, text in rows
+    )
+    return (
+        "<h2>Equations</h2><p>Force and torque on each body as expressions of time t, position x y z, "
+        "velocity vx vy vz, angular velocity wx wy wz, and theta, the angle about z, unwrapped.</p>"
+        f"<table><tr><th>body</th><th>name</th><th>expression</th></tr>{cells}</table>"
+    )
+
+
+def _table(title: str, part: Part, causality: str) -> str:
+    rows = "".join(map(_row, (entry for entry in part.variables if entry.causality == causality)))
+    if not rows:
+        return ""
+    head = "<tr><th>name</th><th>size</th><th>unit</th><th>start</th><th></th><th>meaning</th></tr>"
+    return f"<h2>{title}</h2><table>{head}{rows}</table>"
+
+
+def _row(variable: Variable) -> str:
+    unit = variable.quantity.unit.name if variable.quantity.unit else ""
+    start = ", ".join(f"{value:.6g}" for value in variable.start) if any(variable.start) else "0"
+    cells = (
+        f"<code>{escape(variable.name)}</code>",
+        " × ".join(map(str, variable.dimensions)),
+        unit,
+        start if variable.start else "",
+        variable.variability if variable.causality == "parameter" else "",
+        escape(variable.description),
+    )
+    return "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+
+
+def _bodies(part: Part) -> str:
+    """The joints: who carries whom."""
+    mechanism = part.mechanism
+    names = (*mechanism.bodies, "world")
+    rows = "".join(
+        f"<tr><td>{escape(joint)}</td><td>{escape(names[int(parent)])}</td><td>{escape(body)}</td></tr>"
+        for joint, parent, body in zip(
+            mechanism.joints, mechanism.tables.parent, mechanism.bodies, strict=True
+        )
+    )
+    return f"<h2>Joints</h2><table><tr><th>joint</th><th>parent</th><th>child</th></tr>{rows}</table>"

@@ -1,0 +1,34 @@
+"""How the values of an FMU are laid out: the sections of ``fmu/fmi/lw_fmu.h`` and their sizes."""
+
+from __future__ import annotations
+
+from itertools import accumulate
+
+
+def dynamics_sections(n: int, nq: int, nv: int) -> dict[str, int]:
+    """Return the size of each section, in order, for n bodies, nq coordinates and nv degrees of freedom."""
+    known = {
+        "MASS": n, "INERTIA": 6 * n, "PARENT_POINT": 3 * n, "CHILD_POINT": 3 * n, "GRAVITY": 3,
+        "STIFFNESS": nv, "DAMPING": nv, "REST": nq, "RTOL": 1, "ATOL": 1,
+        "FORCE": 3 * n, "TORQUE": 3 * n, "ADDED_INERTIA": 36 * n, "Q": nq, "V": nv,
+    }  # fmt: skip
+    calculated = {
+        "DER_Q": nq, "DER_V": nv, "POSITION": 3 * n, "ORIENTATION": 4 * n, "LINEAR": 3 * n, "ANGULAR": 3 * n,
+        "LINEAR_ACCELERATION": 3 * n, "ANGULAR_ACCELERATION": 3 * n, "REACTION_FORCE": 3 * n,
+        "REACTION_TORQUE": 3 * n, "KINETIC_ENERGY": 1, "POTENTIAL_ENERGY": 1,
+    }  # fmt: skip
+    return known | calculated
+
+
+def aero_sections(n: int) -> dict[str, int]:
+    """Return the size of each section of a force FMU, in order, for n bodies."""
+    return {
+        "DENSITY": 1, "WIND": 3, "LENGTH": n, "SPAN": n,
+        "POSITION": 3 * n, "ORIENTATION": 4 * n, "LINEAR": 3 * n, "ANGULAR": 3 * n,
+        "FORCE": 3 * n, "TORQUE": 3 * n, "ADDED_INERTIA": 36 * n,
+    }  # fmt: skip
+
+
+def starts(sections: dict[str, int]) -> dict[str, int]:
+    """Return where each section starts in the array of all values."""
+    return dict(zip(sections, accumulate(sections.values(), initial=0), strict=False))

@@ -1,0 +1,128 @@
+"""What depends on what in a mechanism: the bodies of one tree, the joints on the way to a body."""
+
+from __future__ import annotations
+
+from linkwind.fmi.coordinates import Piece, joint_names, pieces
+from linkwind.fmi.variables import Dependence, Kind
+from linkwind.mechanism import Mechanism
+
+Dependences = tuple[Dependence, ...]
+
+
+class Structure:
+    """Dependences of the quantities of a mechanism on its knowns.
+
+    Lists may name a known that happens to have no influence for a special geometry, never leave one out.
+    """
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        parents = mechanism.tables.parent.tolist()
+        self._bodies, self._joints = mechanism.bodies, joint_names(mechanism)
+        self._stated = [is_stated(joint) for joint in mechanism.joints]
+        self._pieces = pieces(mechanism)
+        self._path = [_path(i, parents) for i in range(len(parents))]
+        roots = [path[0] for path in self._path]
+        self._tree = [[k for k, root in enumerate(roots) if root == roots[i]] for i in range(len(roots))]
+
+    def position(self, i: int) -> Dependences:
+        """Of the centre of mass of body i."""
+        return tuple(
+            Dependence(piece.called("q"), "dependent" if piece.turns else _kind(piece))
+            for piece in self._on(i)
+        )
+
+    def orientation(self, i: int) -> Dependences:
+        """Of body i."""
+        return tuple(Dependence(piece.called("q")) for piece in self._on(i) if piece.turns)
+
+    def linear(self, i: int) -> Dependences:
+        """Of the velocity of body i: lever arms do not depend on where the root is."""
+        arms = [Dependence(p.called("q")) for p in self._on(i) if p.turns or not p.of_root]
+        speeds = [Dependence(p.called("v"), "dependent" if p.turns else _kind(p)) for p in self._on(i)]
+        return (*arms, *speeds)
+
+    def angular(self, i: int) -> Dependences:
+        """Of the angular velocity of body i: each joint turns about an axis that those before have turned."""
+        turns = [piece for piece in self._on(i) if piece.turns]
+        turned = [p for p in turns if p is not turns[-1] or p.quaternion]
+        rates = [Dependence(p.called("v"), "dependent" if p.quaternion else _kind(p)) for p in turns]
+        return (*(Dependence(p.called("q")) for p in turned), *rates)
+
+    def acceleration(self, i: int) -> Dependences:
+        """Of accelerations and reactions of body i: on everything in its tree."""
+        knowns = []
+        for k in self._tree[i]:
+            knowns += [piece.called(what) for piece in self._pieces[k] for what in ("q", "v")]
+            knowns += [f"{self._bodies[k]}.{what}" for what in ("F", "T", "A")]
+        return tuple(map(Dependence, knowns))
+
+    def kinetic_energy(self) -> Dependences:
+        """Of all bodies."""
+        every = [piece for joint in self._pieces for piece in joint]
+        return (
+            *(Dependence(piece.called("q")) for piece in every if piece.turns or not piece.of_root),
+            *(Dependence(piece.called("v")) for piece in every),
+        )
+
+    def potential_energy(self) -> Dependences:
+        """Of all bodies and springs."""
+        return tuple(Dependence(piece.called("q")) for joint in self._pieces for piece in joint)
+
+    def geometry(self, i: int) -> Dependences:
+        """Parameters that place the joints on the way to body i."""
+        stated = [k for k in self._path[i] if self._stated[k]]
+        return self._parameters(stated, "parent_point", "child_point")
+
+    def inertia(self, i: int) -> Dependences:
+        """Parameters that accelerations in the tree of body i depend on."""
+        tree = self._tree[i]
+        stated = [k for k in tree if self._stated[k]]
+        bodies = tuple(Dependence(f"{self._bodies[k]}.{what}") for k in tree for what in ("mass", "inertia"))
+        points = self._parameters(stated, "parent_point", "child_point")
+        return (
+            Dependence("gravity"),
+            *bodies,
+            *points,
+            *self._springs(stated, "stiffness", "damping", "rest"),
+        )
+
+    def stored(self) -> Dependences:
+        """Parameters of the potential energy."""
+        stated = [k for k, yes in enumerate(self._stated) if yes]
+        masses = tuple(Dependence(f"{body}.mass") for body in self._bodies)
+        points = self._parameters(stated, "parent_point", "child_point")
+        return (Dependence("gravity"), *masses, *points, *self._springs(stated, "stiffness", "rest"))
+
+    def moving(self) -> Dependences:
+        """Parameters of the kinetic energy."""
+        stated = [k for k, yes in enumerate(self._stated) if yes]
+        bodies = tuple(Dependence(f"{body}.{what}") for body in self._bodies for what in ("mass", "inertia"))
+        return (*bodies, *self._parameters(stated, "parent_point", "child_point"))
+
+    def _on(self, i: int) -> list[Piece]:
+        return [piece for k in self._path[i] for piece in self._pieces[k]]
+
+    def _parameters(self, joints: list[int], *whats: str) -> Dependences:
+        return tuple(Dependence(f"{self._joints[k]}.{what}") for k in joints for what in whats)
+
+    def _springs(self, joints: list[int], *whats: str) -> Dependences:
+        return tuple(
+            Dependence(piece.called(what)) for k in joints for piece in self._pieces[k] for what in whats
+        )
+
+
+def is_stated(joint: str) -> bool:
+    """Return whether the scenario states a joint of this name; automatic ones hold a character it refuses."""
+    return "-" not in joint
+
+
+def _path(i: int, parents: list[int]) -> list[int]:
+    """Return the joints from the root to body i."""
+    way = [i]
+    while parents[way[-1]] >= 0:
+        way.append(parents[way[-1]])
+    return way[::-1]
+
+
+def _kind(piece: Piece) -> Kind:
+    return "constant" if piece.of_root else "dependent"

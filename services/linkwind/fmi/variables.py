@@ -1,0 +1,164 @@
+"""What a variable of an FMU is; and the names by which tools find them.
+
+Names follow the structured convention of FMI: what it belongs to, a dot, what it is. Vectors are in the
+world W, at the centre of mass; units are SI. For a body ``link1``:
+
+================= =========== ==================================================================
+name              size        meaning
+================= =========== ==================================================================
+link1.F           3           force on the body [N]
+link1.T           3           torque on the body about its centre of mass [N·m]
+link1.A           6, 6        added inertia, in the body frame, force rows first: wrench −A·a
+link1.r           3           position of the centre of mass [m]
+link1.orientation 4           unit quaternion (w, x, y, z), body to world
+link1.v, link1.w  3           velocity [m/s], angular velocity [rad/s]
+link1.a           3           acceleration dv/dt [m/s²]
+link1.alpha       3           angular acceleration dw/dt [rad/s²]
+link1.mass        1           [kg]
+link1.inertia     6           Ixx, Iyy, Izz, Ixy, Ixz, Iyz, body frame, about the centre of mass [kg·m²]
+link1.length      1           chord of the plate [m] (aero)
+link1.span        1           span of the plate [m] (aero)
+================= =========== ==================================================================
+
+and for a joint ``hinge``:
+
+================================ =========================================================================
+name                             meaning
+================================ =========================================================================
+hinge.q, hinge.v                 coordinates and velocities; a revolute or prismatic joint has one of each,
+                                 a spherical one a quaternion and an angular velocity
+der(hinge.q), der(hinge.v)       their derivatives
+hinge.F, hinge.T                 reaction of parent on child at the joint's point on the child [N, N·m]
+hinge.parent_point, .child_point the joint's point on parent and child, body frame, from its centre of mass
+hinge.stiffness, .damping, .rest of the joint's springs and dampers
+================================ =========================================================================
+
+Planar and free joints have coordinates of two kinds: ``q_translation`` and ``q_rotation``, likewise ``v_…``,
+``stiffness_…``, ``damping_…``, ``rest_…``. The joint that carries a body without a joint of its own is called
+``world_link1``; it has coordinates only. A joint that is named like a body gets ``_joint`` at its end.
+
+Further names: ``time``, ``gravity``, ``kinetic_energy``, ``potential_energy``, ``solver.integrator``,
+``solver.substeps``, ``solver.rtol``, ``solver.atol``; in the force FMU ``density`` and ``wind``.
+
+In FMI 2, and with scalar arrays, elements are variables of their own: ``link1.F[1]``, ``link1.A[1,6]``,
+``der(hinge.v[2])``.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from linkwind.fmi.units import Quantity
+
+Causality = Literal["independent", "parameter", "input", "output", "local"]
+Variability = Literal["continuous", "fixed", "tunable"]
+Kind = Literal["dependent", "constant"]
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """That an unknown depends on a known.
+
+    Attributes:
+        on: name of the known.
+        kind: ``constant`` where the known enters with a constant factor, else ``dependent``.
+        elementwise: whether element i depends on element i only; both have then the same size.
+    """
+
+    on: str
+    kind: Kind = "dependent"
+    elementwise: bool = False
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable of the FMU: a piece of one section of its values.
+
+    Attributes:
+        name: see the module.
+        section: of the values, as in ``lw_fmu.h``; empty for time.
+        offset: first element within the section.
+        dimensions: shape, row by row in memory; empty for a scalar.
+        causality, variability, initial: of FMI; ``initial`` is empty where FMI has none.
+        quantity: what it measures.
+        description: for people.
+        start: values at the start, as many as it has elements; empty for none.
+        derivative_of: name of the state that this is the derivative of; empty for none.
+        depends: knowns that it depends on while simulating; of outputs and derivatives.
+        initially: knowns that it depends on at initialisation besides those.
+        elements: quantity of each element, where they differ.
+        limits: least and largest value allowed; of integers, which only have this.
+    """
+
+    name: str
+    section: str
+    offset: int
+    dimensions: tuple[int, ...]
+    causality: Causality
+    variability: Variability
+    initial: Literal["", "exact", "calculated"]
+    quantity: Quantity
+    description: str
+    start: tuple[float, ...] = ()
+    derivative_of: str = ""
+    depends: tuple[Dependence, ...] = ()
+    initially: tuple[Dependence, ...] = ()
+    elements: tuple[Quantity, ...] = ()
+    limits: tuple[int, int] | None = None
+
+    @property
+    def size(self) -> int:
+        """Number of elements."""
+        return math.prod(self.dimensions)
+
+    @property
+    def integer(self) -> bool:
+        """Whether it is an Int32; else it is a Float64."""
+        return self.limits is not None
+
+
+def scalars(variables: list[Variable]) -> list[Variable]:
+    """Return the elements of all variables, each as a variable of its own."""
+    names = {variable.name: element_names(variable) for variable in variables}
+    return [_element(variable, index, names) for variable in variables for index in range(variable.size)]
+
+
+def element_names(variable: Variable) -> list[str]:
+    """Return the names of the elements: ``link1.F[1]``, ``der(hinge.v[2])``; of a scalar its own."""
+    if not variable.dimensions:
+        return [variable.name]
+    inner = re.fullmatch(r"der\((.*)\)", variable.name)
+    stem, ending = (f"der({inner[1]}", ")") if inner else (variable.name, "")
+    ranges = (range(1, length + 1) for length in variable.dimensions)
+    return [f"{stem}[{','.join(map(str, indices))}]{ending}" for indices in itertools.product(*ranges)]
+
+
+def _element(variable: Variable, index: int, names: dict[str, list[str]]) -> Variable:
+    state = variable.derivative_of
+    return replace(
+        variable,
+        name=names[variable.name][index],
+        offset=variable.offset + index,
+        dimensions=(),
+        quantity=variable.elements[index] if variable.elements else variable.quantity,
+        start=variable.start[index : index + 1],
+        derivative_of=names[state][index] if state else "",
+        depends=_elements_of(variable.depends, index, names),
+        initially=_elements_of(variable.initially, index, names),
+        elements=(),
+    )
+
+
+def _elements_of(
+    dependences: tuple[Dependence, ...], index: int, names: dict[str, list[str]]
+) -> tuple[Dependence, ...]:
+    found = []
+    for dependence in dependences:
+        all_names = names[dependence.on]
+        on = all_names[index : index + 1] if dependence.elementwise else all_names
+        found += [Dependence(name, dependence.kind) for name in on]
+    return tuple(found)
