@@ -15,6 +15,7 @@ from linkwind.fmi.part import Part
 from linkwind.fmi.toolchain import PLATFORMS
 
 DATA_FILE = "lw_fmu_data.c"
+HIDE = "-DLW_API="  # the library itself is not exported
 _AT_ONCE = 2  # compilers
 
 
@@ -83,7 +84,7 @@ def _compile(sources: Mapping[str, bytes], name: str, command: list[str]) -> byt
         inputs = sorted(file for file in sources if file.endswith(".c"))
         if "-target" not in command:  # zig keeps objects by itself, and is busy with other platforms
             inputs = _objects(inputs, place, command)
-        arguments = [*command, *flags(), "-shared", "-s", "-o", "binary", *inputs, *extra]
+        arguments = [*command, *flags(), HIDE, "-shared", "-s", "-o", "binary", *inputs, *extra]
         toolchain.run(arguments, place, f"the binary for {name}")
         return (place / "binary").read_bytes()
 
@@ -94,7 +95,8 @@ def _objects(inputs: list[str], place: Path, command: list[str]) -> list[str]:
     with ThreadPoolExecutor(_AT_ONCE) as pool:
         list(
             pool.map(
-                lambda group: toolchain.run([*command, *flags(), "-c", *group], place, "the binary"), groups
+                lambda group: toolchain.run([*command, *flags(), HIDE, "-c", *group], place, "the binary"),
+                groups,
             )
         )
     return [file.removesuffix(".c") + ".o" for file in inputs]

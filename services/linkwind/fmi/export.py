@@ -147,6 +147,9 @@ def _build_description(part: Part, own: Sequence[str]) -> bytes:
     for name in own:
         ET.SubElement(files, "SourceFile", name=name)
     ET.SubElement(
+        files, "PreprocessorDefinition", name="LW_API", value="", description="Exports the FMI only"
+    )
+    ET.SubElement(
         configuration, "Library", name="m", external="true", description="Mathematics, where it is apart"
     )
     return to_bytes(root)

@@ -1,0 +1,140 @@
+"""``linkwind fmu …``: FMUs out of scenarios, and what is in an FMU."""
+
+from __future__ import annotations
+
+import json
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from linkwind.cli.options import JsonOption, ScenarioArgument, SetOption
+
+if TYPE_CHECKING:
+    from linkwind.fmi.check import Checked
+
+FileArgument = Annotated[Path, typer.Argument(help="The FMU.")]
+
+
+class Fmi(StrEnum):
+    """Version of FMI."""
+
+    TWO = "2"
+    THREE = "3"
+
+
+class PartChoice(StrEnum):
+    """What is exported."""
+
+    DYNAMICS = "dynamics"
+    AERO = "aero"
+
+
+class ArraysChoice(StrEnum):
+    """How arrays appear in FMI 3."""
+
+    NATIVE = "native"
+    SCALAR = "scalar"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands."""
+    group = typer.Typer(help="Export, check and look into FMUs.", no_args_is_help=True)
+    group.command()(export)
+    group.command()(check)
+    group.command()(info)
+    app.add_typer(group, name="fmu")
+
+
+def export(
+    scenario: ScenarioArgument,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="The file; SCENARIO.fmu here if not given.")
+    ] = None,
+    fmi: Annotated[Fmi, typer.Option(help="Version of FMI.")] = Fmi.TWO,
+    platforms: Annotated[
+        str,
+        typer.Option(
+            metavar="host|all|LIST",
+            help="Binaries: for this machine, for all platforms, or a list such as "
+            "x86_64-linux,aarch64-linux,x86_64-windows,x86_64-darwin,aarch64-darwin.",
+        ),
+    ] = "host",
+    part: Annotated[
+        PartChoice, typer.Option(help="The mechanism, or the force model.")
+    ] = PartChoice.DYNAMICS,
+    arrays: Annotated[
+        ArraysChoice, typer.Option(help="Arrays in FMI 3; scalar for tools that have none.")
+    ] = ArraysChoice.NATIVE,
+    set_: SetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Write a scenario's mechanism as an FMU: Co-Simulation and Model Exchange, C inside.
+
+    Example: linkwind fmu export two_link -o two_link.fmu --fmi 3 --platforms all
+    """
+    from linkwind.fmi.export import export as export_fmu
+    from linkwind.scenario import load
+
+    loaded = load(scenario, set_ or [])
+    ending = "_aero" if part is PartChoice.AERO else ""
+    done = export_fmu(
+        loaded,
+        out or Path(f"{loaded.name}{ending}.fmu"),
+        fmi=fmi.value,
+        platforms=platforms.split(","),
+        part=part.value,
+        arrays=arrays.value,
+    )
+    if as_json:
+        summary = {"file": str(done.file), "bytes": done.bytes, "fmi": done.fmi}
+        typer.echo(json.dumps(summary | {"platforms": list(done.platforms)}))
+        return
+    typer.echo(
+        f"wrote {done.file}: FMI {done.fmi}, {done.bytes / 1000:.0f} kB, for {', '.join(done.platforms)}"
+    )
+
+
+def check(file: FileArgument, as_json: JsonOption = False) -> None:
+    """Check any FMU: with FMPy and other tools that are installed, and against its own references.
+
+    Example: linkwind fmu check two_link.fmu
+    """
+    from linkwind.fmi.check import check as check_fmu
+
+    found = check_fmu(file)
+    if as_json:
+        typer.echo(json.dumps(_as_json(found)))
+    else:
+        _show(found)
+    if not found.ok:
+        raise typer.Exit(5)
+
+
+def _as_json(found: Checked) -> dict[str, Any]:
+    return {
+        "ok": found.ok,
+        "errors": list(found.errors),
+        "checkers": found.checkers,
+        "reference_max_error": found.reference_max_error,
+    }
+
+
+def _show(found: Checked) -> None:
+    for name, result in found.checkers.items():
+        typer.echo(f"{name:>26}  {result}")
+    if found.reference_max_error is not None:
+        typer.echo(f"{'deviation from references':>26}  {found.reference_max_error:.3g}")
+    for error in found.errors:
+        typer.echo(f"error: {error}", err=True)
+
+
+def info(file: FileArgument) -> None:
+    """Print what an FMU can do, the platforms that it runs on, and its variables.
+
+    Example: linkwind fmu info two_link.fmu
+    """
+    from linkwind.fmi.info import show
+
+    show(file)
