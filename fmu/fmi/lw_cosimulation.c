@@ -7,11 +7,14 @@
 static int check_step(const lw_instance *instance, double point, double size) {
     /* The environment's clock may sum up its steps: round-off is no error, the wrong step is. */
     double slack = 1e-6 * size + 1e-12 * fmax(fabs(point), fabs(instance->time));
-    if (!(size > 0.0) || !isfinite(size) || !(point + size > point))
+    if (!(size > 0.0) || !isfinite(size))
         return lw_report(instance, LW_FMI_ERROR, "Expected communicationStepSize > 0 but was %.17g.", size);
     if (!(fabs(point - instance->time) <= slack))
         return lw_report(instance, LW_FMI_ERROR, "Expected currentCommunicationPoint = %.17g but was %.17g.",
                          instance->time, point);
+    if (!(point + size > point))
+        return lw_report(instance, LW_FMI_ERROR, "Expected communicationStepSize to advance the time %.17g but "
+                         "was %.17g.", point, size);
     if (point + size > instance->stop + slack)
         return lw_report(instance, LW_FMI_ERROR,
                          "Expected a step that ends by stopTime = %.17g but was %.17g.", instance->stop,

@@ -54,9 +54,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     return lw_create(&with, name, guid);
 }
 
-void fmi2FreeInstance(fmi2Component c) {
-    if (c) lw_free(c);
-}
+void fmi2FreeInstance(fmi2Component c) { lw_free(c, __func__); }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance,
                                fmi2Real start, fmi2Boolean stop_defined, fmi2Real stop) {

@@ -87,9 +87,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token
     return unsupported(&with, "Co-Simulation or Model Exchange (there is no Scheduled Execution)"), NULL;
 }
 
-void fmi3FreeInstance(fmi3Instance c) {
-    if (c) lw_free(c);
-}
+void fmi3FreeInstance(fmi3Instance c) { lw_free(c, __func__); }
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_defined, fmi3Float64 tolerance,
                                        fmi3Float64 start, fmi3Boolean stop_defined, fmi3Float64 stop) {

@@ -93,7 +93,9 @@ lw_instance *lw_create(const lw_instance *with, const char *name, const char *to
     return instance;
 }
 
-void lw_free(lw_instance *instance) {
+void lw_free(void *pointer, const char *function) {
+    lw_instance *instance = lw_enter(pointer, function, LW_RESTING); /* not while it takes a step */
+    if (!instance) return;
     lw_free_snapshots(instance);
     free(instance);
 }

@@ -57,7 +57,7 @@ struct lw_instance {
 /* Returns NULL for an empty name, another token, or no memory; the reason goes to the logger of `with`, of
  * which the members of the environment and the kind are taken. */
 lw_instance *lw_create(const lw_instance *with, const char *name, const char *token);
-void lw_free(lw_instance *);
+void lw_free(void *instance, const char *function);
 void lw_reset(lw_instance *);
 /* The instance, if the call is allowed in its mode (a mask of lw_modes.h); else NULL. */
 lw_instance *lw_enter(void *instance, const char *function, unsigned allowed);

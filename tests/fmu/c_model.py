@@ -245,6 +245,11 @@ class Instance:
         self.do("GetFloat64", pointer(vrs), ctypes.c_size_t(len(vrs)), pointer(values), ctypes.c_size_t(values.size))
         return values
 
+    def get_time(self) -> float:
+        vrs, values = np.zeros(1, dtype=np.uint32), np.zeros(1)
+        self.do("GetFloat64", pointer(vrs), ctypes.c_size_t(1), pointer(values), ctypes.c_size_t(1))
+        return float(values[0])
+
     def try_set(self, section: str, values) -> int:
         vrs, data = self.vrs(section), np.ascontiguousarray(np.ravel(values), dtype=float)
         return self.call("SetFloat64", pointer(vrs), ctypes.c_size_t(len(vrs)), pointer(data),
