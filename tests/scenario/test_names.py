@@ -4,7 +4,7 @@ import pkgutil
 from typing import get_args
 
 from linkwind import bus
-from linkwind.aero import MODELS
+from linkwind.aero import FROM_FILE, MODELS
 from linkwind.coupling import SCHEMES
 from linkwind.native.forces import COMPONENTS, Coefficients
 from linkwind.native.multibody import JOINT_TYPES, Integrator
@@ -22,7 +22,7 @@ def test_integrators():
 
 
 def test_aero_models():
-    assert get_args(AeroModel) == tuple(MODELS)
+    assert get_args(AeroModel) == (*MODELS, *FROM_FILE)
 
 
 def test_plate_coefficients():

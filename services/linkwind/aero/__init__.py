@@ -3,19 +3,23 @@
 >>> model = build(scenario, scenario.providers[0])
 >>> model.commit(0.0, accepted)
 >>> model.evaluate(0.001, trial, wrench)  # fills the wrench in place
+
+``MODELS`` need nothing but the scenario; the model ``fmu`` needs a file as well.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
-from linkwind.aero.base import Capabilities, ForceModel
+from linkwind.aero.base import Capabilities, ForceModel, item, table
 from linkwind.aero.field import ForceField
 from linkwind.aero.none import Vacuum
 from linkwind.aero.plate import Plate
+from linkwind.errors import InputError
 from linkwind.scenario import Provider, Scenario
 
-__all__ = ["MODELS", "Capabilities", "ForceModel", "build"]
+__all__ = ["FROM_FILE", "MODELS", "Capabilities", "ForceModel", "build"]
 
 MODELS: dict[str, Callable[[Scenario, Provider], ForceModel]] = {
     "none": Vacuum,
@@ -24,10 +28,28 @@ MODELS: dict[str, Callable[[Scenario, Provider], ForceModel]] = {
 }
 
 
-def build(scenario: Scenario, provider: Provider) -> ForceModel:
+FROM_FILE = ("fmu",)  # models that are made from a file
+
+
+def build(scenario: Scenario, provider: Provider, file: Path | None = None) -> ForceModel:
     """Return the force model of a provider.
 
+    Args:
+        scenario: all of it.
+        provider: the one to make the model of.
+        file: of a model from a file (``--force-fmu``).
+
     Raises:
-        InputError: the scenario does not give what the model needs.
+        InputError: the scenario does not give what the model needs, or the file is wrong.
+        SimulationError: an FMU cannot be started.
     """
+    if provider.model in FROM_FILE:
+        from linkwind.aero.fmu import ForceFmu
+
+        return ForceFmu(scenario, provider, file)
+    if file is not None:
+        raise InputError(
+            f'{item(scenario, provider, "model")}: expected "fmu" for {file}; got "{provider.model}". Start '
+            f"the dynamics with --set {table(scenario, provider)}.model=fmu."
+        )
     return MODELS[provider.model](scenario, provider)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from linkwind import aero
 from linkwind.bus.base import ProviderLink
 from linkwind.errors import FaultError, LostError
@@ -11,12 +13,17 @@ from linkwind.scenario import from_json
 GOODBYE_TIMEOUT = 2.0  # s; a dynamics that is gone by then does not need the Bye
 
 
-def session(name: str) -> ProviderSession:
-    """Return the protocol state of the provider ``name``, which takes its scenario from the dynamics."""
+def session(name: str, file: Path | None = None) -> ProviderSession:
+    """Return the protocol state of the provider ``name``, which takes its scenario from the dynamics.
+
+    Args:
+        name: of the provider.
+        file: of a model from a file, known on this side only.
+    """
 
     def build(scenario_json: str, provider: str) -> Model:
         scenario = from_json(scenario_json)
-        return aero.build(scenario, next(p for p in scenario.providers if p.name == provider))
+        return aero.build(scenario, next(p for p in scenario.providers if p.name == provider), file)
 
     return ProviderSession(name, build)
 
@@ -48,4 +55,6 @@ def serve(link: ProviderLink, provider: ProviderSession, start_timeout: float) -
         if not isinstance(error, LostError | FaultError):
             link.request(provider.fault(error), GOODBYE_TIMEOUT)
         raise
+    finally:
+        provider.close()
     link.request(provider.bye(), GOODBYE_TIMEOUT)

@@ -21,10 +21,14 @@ class InProcessLink:
         self._session = session
         self._providers = list(providers)
         self._answers: deque[tuple[str, bytes]] = deque()
-        for provider in self._providers:
-            provider.welcome(session.control(provider.hello()))
-            provider.build()
-            provider.started(session.control(provider.ready()))
+        try:
+            for provider in self._providers:
+                provider.welcome(session.control(provider.hello()))
+                provider.build()
+                provider.started(session.control(provider.ready()))
+        except BaseException:
+            self.close()
+            raise
 
     def wait(self, done: Callable[[], bool], timeout: float, poll: Callable[[], None]) -> bool:
         """Everything has been said by the time that this is called."""
@@ -50,4 +54,6 @@ class InProcessLink:
         """Nobody is left to be told."""
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Let every provider end what it holds."""
+        for provider in self._providers:
+            provider.close()

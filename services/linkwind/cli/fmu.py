@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from linkwind.cli.fmu_map import fmu_map
 from linkwind.cli.options import JsonOption, ScenarioArgument, SetOption
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ def register(app: typer.Typer) -> None:
     group.command()(export)
     group.command()(check)
     group.command()(info)
+    group.command("map")(fmu_map)
     app.add_typer(group, name="fmu")
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from linkwind.cli.force_fmu import ForceFmuOption, load_with, refuse_missing
 from linkwind.cli.options import (
     ConnectOption,
     JsonOption,
@@ -34,6 +36,7 @@ def run(
     scenario: ScenarioArgument,
     out: OutOption = None,
     set_: SetOption = None,
+    force_fmu: ForceFmuOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Run a scenario: start every participant, exchange, log, report.
@@ -43,8 +46,15 @@ def run(
     from linkwind.runs.run import run as run_scenario
     from linkwind.scenario import load
 
-    loaded = load(scenario, set_ or [])
-    _show(loaded, lambda progress: run_scenario(loaded, out, progress), as_json=as_json)
+    files: dict[str, Path] = {}
+    if force_fmu:
+        loaded, files, tables = load_with(scenario, set_ or [], force_fmu)
+        for table in [] if as_json else tables:
+            typer.echo(table)
+    else:
+        loaded = load(scenario, set_ or [])
+    refuse_missing(loaded, files)
+    _show(loaded, lambda progress: run_scenario(loaded, out, progress, files), as_json=as_json)
 
 
 def dynamics(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -19,6 +21,9 @@ def aero(
     listen: ListenOption = None,
     name: Annotated[str, typer.Option(help="Of the provider, as in the scenario.")] = "aero",
     run: Annotated[str, typer.Option(help="Id of the run to take part in; * for the only one there.")] = "*",
+    force_fmu: Annotated[
+        Path | None, typer.Option(help="The FMU, for a provider whose model is fmu; its path stays here.")
+    ] = None,
     start_timeout: Annotated[float, typer.Option(help="Wait this long for the dynamics [s].")] = 60.0,
 ) -> None:
     """Start one force provider; it takes the scenario from the dynamics.
@@ -31,8 +36,9 @@ def aero(
 
     if not connect and not listen:
         connect = [DEFAULT_ENDPOINT]
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
     link = ZenohProviderLink(connect or [], listen or [], run)
     try:
-        serve(link, session(name), start_timeout)
+        serve(link, session(name, force_fmu), start_timeout)
     finally:
         link.close()

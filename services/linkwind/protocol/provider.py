@@ -71,6 +71,7 @@ class ProviderSession:
         self.run = ""
         self.at = (-1, 0)
         self._build = build
+        self._close: Callable[[], None] = lambda: None
         self._answer = b""
 
     def hello(self) -> bytes:
@@ -107,6 +108,7 @@ class ProviderSession:
             InputError: the scenario does not make a model.
         """
         self._model = self._build(self._scenario_json, self.name)
+        self._close = getattr(self._model, "close", self._close)
         can = self._model.capabilities
         self._wrench = WrenchMessage(
             self.run,
@@ -193,6 +195,10 @@ class ProviderSession:
     def bye(self) -> bytes:
         """Return the answer to the final motion."""
         return bytes(Control(bye={"name": self.name}).SerializeToString())
+
+    def close(self) -> None:
+        """End what the force model holds, such as a process of its own."""
+        self._close()
 
     def fault(self, error: BaseException) -> bytes:
         """Return the message that tells the others that this provider cannot go on."""

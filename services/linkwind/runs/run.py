@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
+from types import FrameType, MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -62,13 +62,19 @@ class Outcome:
 Progress = Callable[[int], None]
 
 
-def run(scenario: Scenario, out: Path | None, progress: Progress) -> Outcome:
+def run(
+    scenario: Scenario,
+    out: Path | None,
+    progress: Progress,
+    files: Mapping[str, Path] = MappingProxyType({}),
+) -> Outcome:
     """Run ``scenario`` with every provider on this machine.
 
     Args:
         scenario: what to run.
         out: folder for the results; None for a new one under ``runs/``.
         progress: is told now and then how many steps are done.
+        files: of the providers whose model is made from a file, by name.
 
     Raises:
         LinkwindError: the run ended early; its log and report tell as well.
@@ -76,13 +82,15 @@ def run(scenario: Scenario, out: Path | None, progress: Progress) -> Outcome:
     folder = folders.create(scenario.name, out)
     service = DynamicsService(scenario, build(scenario), folders.run_id(folder))
     if scenario.bus.transport == "inprocess":
-        return _drive(scenario, service, folder, progress, lambda: _inprocess(service), lambda: None)
+        return _drive(scenario, service, folder, progress, lambda: _inprocess(service, files), lambda: None)
     from linkwind.bus.zenoh import loopback_endpoint
 
     with children(folder) as providers:
         endpoint = loopback_endpoint()
         for name in service.session.providers:
             arguments = ["aero", "--connect", endpoint, "--name", name, "--run", service.session.run]
+            if name in files:
+                arguments += ["--force-fmu", str(files[name].resolve())]
             providers.start(name, [*arguments, "--start-timeout", str(scenario.bus.start_timeout)])
         open_link = lambda: zenoh_link(service, scenario, [endpoint], [])  # noqa: E731
         return _drive(scenario, service, folder, progress, open_link, providers.check)
@@ -154,11 +162,13 @@ def zenoh_link(
     return ZenohDynamicsLink(service.session, listen, connect, scenario.coupling.timeout)
 
 
-def _inprocess(service: DynamicsService) -> DynamicsLink:
+def _inprocess(service: DynamicsService, files: Mapping[str, Path]) -> DynamicsLink:
     from linkwind.aero.service import session
     from linkwind.bus.inprocess import InProcessLink
 
-    return InProcessLink(service.session, [session(name) for name in service.session.providers])
+    return InProcessLink(
+        service.session, [session(name, files.get(name)) for name in service.session.providers]
+    )
 
 
 @contextmanager

@@ -131,7 +131,8 @@ def _first(names: Sequence[str]) -> str:
 
 def _masses(scenario: Scenario) -> Iterator[Problem]:
     """A body without mass moves only if a model adds inertia to it."""
-    carried = {name for entry in scenario.providers if entry.model == "plate" for name in entry.bodies}
+    adding = [entry for entry in scenario.providers if entry.model in ("plate", "fmu")]
+    carried = {name for entry in adding for name in entry.bodies}
     for index, body in enumerate(scenario.bodies):
         if body.mass == 0.0 and body.name not in carried:
             expected = "a number above 0 [kg], because no provider adds inertia to this body"

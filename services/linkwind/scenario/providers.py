@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 
 from linkwind.scenario.problems import ProblemError
-from linkwind.scenario.quantities import Name, Section
+from linkwind.scenario.quantities import Name, Section, Vector, quantity
 
-AeroModel = Literal["none", "field", "plate"]
+AeroModel = Literal["none", "field", "plate", "fmu"]
 PlateCoefficients = Literal["ristroph", "andersen"]
 
 
@@ -70,6 +71,88 @@ class PlateModel(Section):
     )
 
 
+def _value(value: Any) -> Any:
+    entries = value if isinstance(value, list | tuple) else [value]
+    if not all(isinstance(entry, bool | int | float | str) for entry in entries):
+        raise ProblemError.value("a number, true, false, a text, or a list of these", value, "Write it so.")
+    return tuple(value) if isinstance(value, list) else value
+
+
+_SCALAR = {"type": ["number", "boolean", "string"]}
+Value = Annotated[
+    Any,
+    BeforeValidator(_value),
+    WithJsonSchema({"anyOf": [_SCALAR, {"type": "array", "items": _SCALAR}]}),
+]
+
+
+def _digest(value: Any) -> Any:
+    if value is not None and not (isinstance(value, str) and re.fullmatch(r"[0-9a-f]{64}", value)):
+        expected = "64 hexadecimal digits"
+        raise ProblemError.value(expected, value, "Write what sha256sum prints, or leave it out.")
+    return value
+
+
+def _link(value: Any) -> Any:
+    return {"quantity": value} if isinstance(value, str) else value
+
+
+class FmuVariable(Section):
+    """What a variable of an FMU is, where its name does not tell."""
+
+    frame: Literal["world", "body"] | None = Field(default=None, description="Frame of its components")
+    point: Vector | None = quantity(
+        "Point of the body that it is taken at, in the body frame from the centre of mass", "m", None
+    )
+    unit: str | None = Field(default=None, description="Unit of the FMU's value; default: what the FMU says")
+    scale: float = quantity("Input: SI value given = scale * quantity + offset; output: likewise", "1", 1.0)
+    offset: float = quantity("See scale", "SI unit", 0.0)
+    quantity: str = Field(
+        description="[body.]quantity[.component], such as link1.velocity.x; none: an output that is not used"
+    )
+
+
+class FmuModel(Section):
+    """How a foreign FMU is run as a force model. Its file is named on the command line: --force-fmu."""
+
+    sha256: Annotated[str | None, BeforeValidator(_digest)] = Field(
+        default=None, description="SHA-256 of the file, to accept no other"
+    )
+    interface: Literal["auto", "cs", "me"] = Field(
+        default="auto", description="Co-Simulation or Model Exchange; auto: cs if the FMU has it"
+    )
+    isolation: Literal["process", "inprocess"] = Field(
+        default="process", description="process: nothing that the FMU does harms the run; inprocess: faster"
+    )
+    timeout: float | None = quantity(
+        "Wait this long for a step of the FMU; default: half of coupling.timeout", "s", None, gt=0.0
+    )
+    start_timeout: float = quantity("Wait this long for the FMU to be instantiated", "s", 30.0, gt=0.0)
+    memory: float = quantity("The most memory that the FMU may take", "B", 2e9, ge=1e7)
+    step: float | None = quantity(
+        "Step of the FMU: a part or a multiple of coupling.step; default: what the FMU says",
+        "s",
+        None,
+        gt=0.0,
+    )
+    frame: Literal["world", "body"] | None = Field(
+        default=None,
+        description="Frame of velocities, forces and torques; default: by name, else world",
+    )
+    point: Vector | None = quantity(
+        "Point of the body that motion and force are taken at, in the body frame from the centre of mass",
+        "m",
+        None,
+    )
+    structural: dict[str, int] = Field(default={}, description="Values of structural parameters, by name")
+    start: dict[str, Value] = Field(
+        default={}, description="Start values of parameters and inputs, by name, in the units of the FMU"
+    )
+    variables: dict[str, Annotated[FmuVariable, BeforeValidator(_link)]] = Field(
+        default={}, description="What inputs and outputs are, by name: a quantity, or a table with more"
+    )
+
+
 class Provider(Section):
     """A participant that answers a motion with the wrench on its bodies."""
 
@@ -82,3 +165,4 @@ class Provider(Section):
     field: dict[str, FieldExpressions] = Field(
         default={}, description="The model field: a table for each body, by its name"
     )
+    fmu: FmuModel = Field(default=FmuModel(), description="Settings of the model fmu")

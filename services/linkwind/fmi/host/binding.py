@@ -1,0 +1,295 @@
+"""FMPy's low-level classes with one manner: the same calls for FMI 2 and 3, every one marked and checked.
+
+The arrays of values lie in the memory that host and worker share, and the FMU reads and writes them there.
+"""
+
+from __future__ import annotations
+
+import mmap
+from collections.abc import Callable, Sequence
+from ctypes import byref, c_double, c_uint
+from typing import Any
+
+from fmpy import fmi2, fmi3
+from fmpy.logging import addLoggerProxy
+
+from linkwind.fmi.host.plan import Marker, Plan, Setting
+
+STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
+MAX_EVENT_ITERATIONS = 1000
+
+Log = Callable[[str], None]
+
+
+class CallError(Exception):
+    """A call of the FMU that did not go well; the text says which and how."""
+
+
+class _Missing:
+    """A function that the library does not have; calling it is an error, loading is not."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def __call__(self, *arguments: object) -> None:
+        raise CallError(f"{self.name} is missing in its library")
+
+
+class _Library:
+    """The shared library, with a placeholder for each function that it lacks."""
+
+    def __init__(self, library: Any) -> None:
+        self._library = library
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return getattr(self._library, name)
+        except AttributeError:
+            return _Missing(name)
+
+
+class _Checked:
+    """Mixed into FMPy's classes: marks each call and turns a bad status into a CallError."""
+
+    mark: Callable[[str], None]
+
+    def _loadFunctions(self) -> None:  # noqa: N802  FMPy's name
+        self.dll: Any = _Library(self.dll)
+        super()._loadFunctions()  # type: ignore[misc]
+
+    def _call(self, name: str, *arguments: Any) -> Any:
+        self.mark(name)
+        result = self._functions[name](*arguments)  # type: ignore[attr-defined]
+        if result.__class__ is int and result > 1 and "Instantiate" not in name:
+            got = STATUS[result] if result < len(STATUS) else f"status {result}"
+            raise CallError(f"{name} returned {got}")
+        return result
+
+
+class FMU2SlaveChecked(_Checked, fmi2.FMU2Slave):  # type: ignore[misc]
+    """FMI 2 Co-Simulation. FMPy derives the prefix of the functions from the first letters of the name."""
+
+
+class FMU2ModelChecked(_Checked, fmi2.FMU2Model):  # type: ignore[misc]
+    """FMI 2 Model Exchange."""
+
+
+class FMU3SlaveChecked(_Checked, fmi3.FMU3Slave):  # type: ignore[misc]
+    """FMI 3 Co-Simulation."""
+
+
+class FMU3ModelChecked(_Checked, fmi3.FMU3Model):  # type: ignore[misc]
+    """FMI 3 Model Exchange."""
+
+
+_CLASSES = {
+    (2, "cs"): FMU2SlaveChecked,
+    (2, "me"): FMU2ModelChecked,
+    (3, "cs"): FMU3SlaveChecked,
+    (3, "me"): FMU3ModelChecked,
+}
+
+
+def _text(raw: bytes | None) -> str:
+    return (raw or b"").decode(errors="replace").strip()
+
+
+class Binding:
+    """One instance of an FMU, before the rules of stepping come in.
+
+    Attributes:
+        fmu: FMPy's object, for calls that only one kind of FMU has.
+        version: of FMI.
+    """
+
+    def __init__(self, plan: Plan, number: int, memory: mmap.mmap, mark: Marker, log: Log) -> None:
+        """Load the library and instantiate.
+
+        Raises:
+            CallError: the library cannot be loaded, or the FMU refuses.
+        """
+        self.version = plan.version
+        self._plan = plan
+        self._name = plan.instances[number]
+        mark("dlopen")
+        arguments = {
+            "guid": plan.token,
+            "modelIdentifier": plan.identifier,
+            "unzipDirectory": plan.folder,
+            "instanceName": self._name,
+        }
+        try:
+            self.fmu: Any = _CLASSES[plan.version, plan.interface](**arguments)
+        except Exception as error:
+            raise CallError(" ".join(str(error).split())) from None
+        self.fmu.mark = mark
+        self._bind(plan, number, memory)
+        self._instantiate(plan, log)
+
+    def _bind(self, plan: Plan, number: int, memory: mmap.mmap) -> None:
+        """Make the arguments of the calls of every step once."""
+        accepted, inputs, outputs = plan.places()
+        doubles = c_double * plan.input_size
+        row = 8 * number * plan.input_size
+        self.accepted = doubles.from_buffer(memory, accepted + row)
+        self.inputs = doubles.from_buffer(memory, inputs + row)
+        out = (c_double * plan.output_size).from_buffer(memory, outputs + 8 * number * plan.output_size)
+        vr_in, vr_out = ((c_uint * len(v))(*v) for v in (plan.inputs, plan.outputs))
+        self._set = (vr_in, len(vr_in))
+        self._get: tuple[Any, ...] = (vr_out, len(vr_out), out)
+        if plan.version == 3:
+            self._get += (plan.output_size,)
+
+    def _instantiate(self, plan: Plan, log: Log) -> None:
+        try:
+            if plan.version == 2:
+                self.fmu.instantiate(callbacks=_callbacks2(log), loggingOn=True)
+            elif plan.interface == "cs":
+                # Early return goes with events: without event mode there is nothing to return for.
+                self.fmu.instantiate(
+                    loggingOn=True,
+                    eventModeUsed=plan.event_mode,
+                    earlyReturnAllowed=plan.event_mode,
+                    logMessage=_logger3(log),
+                )
+            else:
+                self.fmu.instantiate(loggingOn=True, logMessage=_logger3(log))
+        except CallError:
+            raise
+        except Exception:
+            kind = {"cs": "CoSimulation", "me": "ModelExchange"}[plan.interface]
+            function = "fmi2Instantiate" if plan.version == 2 else f"fmi3Instantiate{kind}"
+            raise CallError(f"{function} returned no instance") from None
+        if plan.log_categories:
+            self._ask_for(plan.log_categories)
+
+    def _ask_for(self, categories: Sequence[str]) -> None:
+        names = (fmi2.fmi2String * len(categories))(*(name.encode() for name in categories))
+        set_logging = self.fmu.fmi2SetDebugLogging if self.version == 2 else self.fmu.fmi3SetDebugLogging
+        set_logging(self.fmu.component, True, len(categories), names)
+
+    # --- before the first step ------------------------------------------------------------------------
+
+    def configure(self, settings: Sequence[Setting]) -> None:
+        """Set structural parameters, in configuration mode."""
+        if settings:
+            self.fmu.enterConfigurationMode()
+            self.set(settings)
+            self.fmu.exitConfigurationMode()
+
+    def set(self, settings: Sequence[Setting]) -> None:
+        """Set values of any type."""
+        for setting in settings:
+            kind = "Integer" if setting.type == "Enumeration" and self.version == 2 else setting.type
+            setter = getattr(self.fmu, "set" + ("Int64" if kind == "Enumeration" else kind))
+            setter([setting.reference], list(setting.values))
+
+    def enter_initialisation(self, start: float) -> None:
+        """Enter initialisation mode at time ``start`` [s]; without a stop time."""
+        if self.version == 2:
+            self.fmu.setupExperiment(startTime=start)
+            self.fmu.enterInitializationMode()
+        else:
+            self.fmu.enterInitializationMode(startTime=start)
+
+    def exit_initialisation(self) -> None:
+        """Leave initialisation mode."""
+        self.fmu.exitInitializationMode()
+
+    def reset(self) -> None:
+        """Go back to what the FMU was after instantiation."""
+        self.fmu.reset()
+
+    # --- every step -----------------------------------------------------------------------------------
+
+    def set_inputs(self, values: Any = None) -> None:
+        """Set the inputs, from the shared memory unless given."""
+        fmu, values = self.fmu, self.inputs if values is None else values
+        if not self._set[1]:
+            return
+        if self.version == 2:
+            fmu.fmi2SetReal(fmu.component, *self._set, values)
+        else:
+            fmu.fmi3SetFloat64(fmu.component, *self._set, values, len(values))
+
+    def get_outputs(self) -> None:
+        """Read the outputs into the shared memory."""
+        fmu = self.fmu
+        (fmu.fmi2GetReal if self.version == 2 else fmu.fmi3GetFloat64)(fmu.component, *self._get)
+
+    def discrete_states(self) -> tuple[bool, float]:
+        """Iterate the discrete states of event mode until they rest.
+
+        Returns:
+            whether continuous states have new values, and the time of the next event [s] (infinite: none).
+        """
+        update = self.fmu.newDiscreteStates if self.version == 2 else self.fmu.updateDiscreteStates
+        changed = False
+        for _ in range(MAX_EVENT_ITERATIONS):
+            again, end, _, states, timed, at = update()
+            changed |= states
+            self.refuse_end(end)
+            if not again:
+                return changed, at if timed else float("inf")
+        raise CallError(f"its discrete states do not come to rest in {MAX_EVENT_ITERATIONS} iterations")
+
+    def refuse_end(self, end: bool) -> None:
+        """Raise CallError if the FMU wants the simulation to end."""
+        if end:
+            raise CallError("it asked to end the simulation (terminateSimulation)")
+
+    # --- its memory -----------------------------------------------------------------------------------
+
+    def keep(self) -> Any:
+        """Return a handle of the FMU's state, to be given back to ``drop``."""
+        return self.fmu.getFMUState()
+
+    def go_back(self, handle: Any) -> None:
+        """Set the FMU's state."""
+        self.fmu.setFMUState(handle)
+
+    def drop(self, handle: Any) -> None:
+        """Free a handle."""
+        self.fmu.freeFMUState(handle)
+
+    def to_bytes(self, handle: Any) -> bytes:
+        """Return a state as bytes."""
+        return bytes(self.fmu.serializeFMUState(handle))
+
+    def from_bytes(self, blob: bytes) -> Any:
+        """Return the handle of a state that was bytes."""
+        return self.fmu.deserializeFMUState(blob)
+
+    def free(self, *, terminate: bool) -> None:
+        """Terminate and free the instance; the library stays loaded."""
+        if terminate:
+            self.fmu.terminate()
+        if self.version == 2:
+            self.fmu.fmi2FreeInstance(self.fmu.component)
+        else:
+            self.fmu.fmi3FreeInstance(self.fmu.component)
+
+
+def _callbacks2(log: Log) -> Any:
+    """Return the callbacks of FMI 2; FMPy's proxy in C fills in the arguments of printf."""
+
+    def logger(_: Any, instance: bytes, status: int, category: bytes, message: bytes) -> None:
+        log(f"{_label(status)}{_text(message)}")
+
+    callbacks = fmi2.fmi2CallbackFunctions()
+    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(logger)
+    callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
+    callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
+    addLoggerProxy(byref(callbacks))
+    return callbacks
+
+
+def _logger3(log: Log) -> Callable[..., None]:
+    def logger(_: Any, status: int, category: bytes, message: bytes) -> None:
+        log(f"{_label(status)}{_text(message)}")
+
+    return logger
+
+
+def _label(status: int) -> str:
+    return f"[{STATUS[status] if 0 <= status < len(STATUS) else status}] "

@@ -1,0 +1,392 @@
+"""Which variable of an FMU is which quantity of which body.
+
+The scenario's table goes first, the names of the variables tell the rest. Every input has to be mapped or
+given a value; of the outputs, those that are mapped are read, and there has to be a force or a torque.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+from typing import Literal
+
+from linkwind.errors import InputError
+from linkwind.fmi.host.description import Description, Unit, Variable
+from linkwind.fmi.host.names import Reading, likeness, read
+from linkwind.fmi.host.quantities import INPUTS, OUTPUTS, exponents, known, to_si, unit_names
+from linkwind.scenario.providers import FmuModel, FmuVariable
+
+Vector3 = tuple[float, float, float]
+SHOWN = 6  # problems in one error
+_GLOBAL = ("density", "wind")  # belong to no body in particular
+
+
+@dataclass(frozen=True)
+class Link:
+    """One element of a variable, and what it is.
+
+    Attributes:
+        element: its name, ``link1.r[2]`` for an element of an array.
+        index: its place among all values of inputs, or of outputs.
+        body: index among the provider's bodies; of one instance for each body always 0.
+        frame, point: of the quantity; the point is in the body frame, from the centre of mass [m].
+        gain, bias: input: FMU's value = gain · quantity + bias; output: quantity = gain · value + bias (SI).
+        unit: as the FMU names it, empty without.
+        by: how it was found.
+    """
+
+    element: str
+    index: int
+    quantity: str
+    component: int
+    body: int
+    frame: Literal["world", "body"] = "world"
+    point: Vector3 | None = None
+    gain: float = 1.0
+    bias: float = 0.0
+    unit: str = ""
+    by: Literal["name", "table"] = "name"
+
+    @property
+    def target(self) -> tuple[str, int, int]:
+        """What it is, to find two that are the same."""
+        return self.quantity, self.component, self.body
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """The mapping of one FMU.
+
+    Attributes:
+        per_body: whether there is one instance for each body; links then speak of body 0.
+        bodies: names of the provider's bodies.
+        inputs, outputs: links, in the order of the values.
+        input_variables, output_variables: whose values are exchanged, in this order.
+        held: inputs that keep a value from the scenario.
+        unmapped: inputs that nothing is known about; none in a mapping to run with.
+        ignored: outputs that are not read.
+    """
+
+    per_body: bool
+    bodies: tuple[str, ...]
+    inputs: tuple[Link, ...]
+    outputs: tuple[Link, ...]
+    input_variables: tuple[Variable, ...]
+    output_variables: tuple[Variable, ...]
+    held: tuple[str, ...]
+    unmapped: tuple[str, ...]
+    ignored: tuple[str, ...]
+
+
+@dataclass
+class _Side:
+    """Inputs or outputs while they are being mapped."""
+
+    causality: Literal["input", "output"]
+    links: list[Link] = field(default_factory=list)
+    variables: list[Variable] = field(default_factory=list)
+    left: list[tuple[Variable, str]] = field(default_factory=list)
+    size: int = 0
+
+
+def elements(variable: Variable) -> list[str]:
+    """Return the names of the elements of a variable, in the order of its values."""
+    if not variable.shape:
+        return [variable.name]
+    ranges = (range(1, size + 1) for size in variable.shape)
+    return [f"{variable.name}[{','.join(map(str, index))}]" for index in itertools.product(*ranges)]
+
+
+def resolve(fmu: Description, settings: FmuModel, bodies: Sequence[str]) -> Mapping:
+    """Map the variables of an FMU.
+
+    Args:
+        fmu: the FMU, with its sizes.
+        settings: of the scenario.
+        bodies: names of the provider's bodies.
+
+    Raises:
+        InputError: an input or the table cannot be mapped, or something is mapped twice; a line each.
+    """
+    mapping, problems = survey(fmu, settings, bodies)
+    if problems:
+        more = len(problems) - SHOWN
+        raise InputError("\n".join(problems[:SHOWN] + [f"{fmu.path}: and {more} more"] * (more > 0)))
+    return mapping
+
+
+def survey(fmu: Description, settings: FmuModel, bodies: Sequence[str]) -> tuple[Mapping, list[str]]:
+    """Map what can be mapped; return it with the problems that ``resolve`` would raise, a line each."""
+    resolver = _Resolver(fmu, settings, tuple(bodies))
+    return resolver.resolve(), resolver.problems
+
+
+class _Resolver:
+    def __init__(self, fmu: Description, settings: FmuModel, bodies: tuple[str, ...]) -> None:
+        self._fmu, self._settings, self._bodies = fmu, settings, bodies
+        self.problems: list[str] = []
+
+    def resolve(self) -> Mapping:
+        self._check_names()
+        inputs = self._side("input")
+        outputs = self._side("output")
+        self._angular(inputs)
+        per_body = self._per_body([*inputs.links, *outputs.links])
+        sides = [self._bodies_of(side, per_body) for side in (inputs, outputs)]
+        for variable, element in inputs.left:
+            self._unmapped(variable, element)
+        self._twice(sides[1])
+        if not self.problems:
+            self._complete(sides[1], per_body, [element for _, element in outputs.left])
+        return Mapping(
+            per_body,
+            self._bodies,
+            tuple(sides[0]),
+            tuple(sides[1]),
+            tuple(inputs.variables),
+            tuple(outputs.variables),
+            held=tuple(v.name for v in self._fmu.variables if self._held(v)),
+            unmapped=tuple(element for _, element in inputs.left),
+            ignored=tuple(element for _, element in outputs.left),
+        )
+
+    def _problem(self, item: str, expected: str, got: str, advice: str) -> None:
+        self.problems.append(f"{self._fmu.path}: {item}: expected {expected}; got {got}. {advice}")
+
+    def _check_names(self) -> None:
+        known_names = {
+            name: variable
+            for variable in self._fmu.variables
+            if variable.causality in ("input", "output")
+            for name in (variable.name, *elements(variable))
+        }
+        for name in self._settings.variables:
+            if name not in known_names:
+                near = get_close_matches(name, known_names, 3, 0.3) or list(known_names)[:3]
+                advice = f"Nearest: {', '.join(near)}." if near else "It has none."
+                self._problem("fmu.variables", "inputs and outputs of the FMU", f'"{name}"', advice)
+
+    # --- one side at a time ---------------------------------------------------------------------------
+
+    def _held(self, variable: Variable) -> bool:
+        return variable.causality == "input" and variable.name in self._settings.start
+
+    def _side(self, causality: Literal["input", "output"]) -> _Side:
+        side = _Side(causality)
+        for variable in self._fmu.variables:
+            if variable.causality == causality and variable.type != "Clock" and not self._held(variable):
+                self._variable(side, variable)
+        return side
+
+    def _variable(self, side: _Side, variable: Variable) -> None:
+        """Map the elements of a variable and count their values where any is mapped."""
+        links, left = [], []
+        for number, element in enumerate(elements(variable)):
+            link = self._element(side, variable, element, number) if variable.real else None
+            if link is None:
+                left.append((variable, element))
+            else:
+                links.append(link)
+        side.left += left
+        if links:
+            side.links += links
+            side.variables.append(variable)
+            side.size += variable.size
+
+    def _element(self, side: _Side, variable: Variable, element: str, number: int) -> Link | None:
+        entry = self._settings.variables.get(element) or self._settings.variables.get(variable.name)
+        if entry is not None:
+            if entry.quantity == "none":
+                return None
+            found = self._table(side.causality, variable, element, number, entry)
+        else:
+            found = read(element, side.causality, self._bodies, scalar=not variable.shape)
+            entry = FmuVariable(quantity="by name")
+        if found is None:
+            return None
+        return self._link(side, variable, element, number, found, entry)
+
+    def _table(
+        self, causality: str, variable: Variable, element: str, number: int, entry: FmuVariable
+    ) -> Reading | None:
+        """Return what the table says: ``[body.]quantity[.component]``."""
+        quantities = INPUTS if causality == "input" else OUTPUTS
+        parts = entry.quantity.split(".")
+        body = self._bodies.index(parts[0]) if parts[0] in self._bodies else None
+        parts = parts[body is not None :]
+        item = f'fmu.variables."{element}"'
+        if not parts or parts[0] not in quantities or len(parts) > 2:
+            expected = f"[body.]quantity[.component] with one of {', '.join(quantities)}"
+            advice = f"Bodies: {', '.join(self._bodies)}."
+            self._problem(item, expected, f'"{entry.quantity}"', advice)
+            return None
+        components = quantities[parts[0]].components
+        if len(parts) == 2:
+            if parts[1] in components:
+                return Reading(parts[0], components.index(parts[1]), body)
+        elif len(components) == 1:
+            return Reading(parts[0], 0, body)
+        elif variable.shape:
+            row, component = divmod(number, len(components))
+            if variable.size == len(components):
+                return Reading(parts[0], component, body)
+            if variable.size == len(components) * len(self._bodies) and body is None:
+                return Reading(parts[0], component, row)
+        got = f'"{entry.quantity}" for {variable.size} value{"s" * (variable.size > 1)}'
+        self._problem(item, f"one of the components {', '.join(components)}", got, "Add it after a dot.")
+        return None
+
+    def _link(
+        self,
+        side: _Side,
+        variable: Variable,
+        element: str,
+        number: int,
+        found: Reading,
+        entry: FmuVariable,
+    ) -> Link | None:
+        quantity = (INPUTS if side.causality == "input" else OUTPUTS)[found.quantity]
+        unit = variable.unit if entry.unit is None else known(entry.unit) or Unit(entry.unit)
+        wanted = exponents(found.quantity, found.component)
+        factor = to_si(unit, wanted)
+        if isinstance(factor, str):
+            advice = (
+                f'If it is right, write unit = "{unit_names(wanted).split(",")[0]}" for it in fmu.variables.'
+            )
+            expected = f"a unit of {found.quantity} ({unit_names(wanted)})"
+            self._problem(f"{side.causality} {element}", expected, factor, advice)
+            return None
+        frame = entry.frame or self._settings.frame or ("body" if found.body_frame else "world")
+        point = entry.point or self._settings.point
+        if entry.frame == "body" and not quantity.turns:
+            self._problem(
+                f'fmu.variables."{element}".frame', "world", "body", f"A {found.quantity} has no other."
+            )
+        gain, bias = _affine(side.causality, factor, entry)
+        return Link(
+            element=element,
+            index=side.size + number,
+            quantity=found.quantity,
+            component=found.component,
+            body=-1 if found.body is None else found.body,
+            frame=frame if quantity.turns else "world",
+            point=point if point and any(point) and _moves(found.quantity) else None,
+            gain=gain,
+            bias=bias,
+            unit=unit.name if unit else "",
+            by="name" if entry.quantity == "by name" else "table",
+        )
+
+    def _angular(self, inputs: _Side) -> None:
+        """Read ``a`` beside ``phi`` as an angular acceleration."""
+        single = {link.element for link in inputs.links}
+        if any(link.quantity == "angle" for link in inputs.links) and "s" not in single:
+            inputs.links = [
+                replace(link, quantity="angular_acceleration", component=2)
+                if link.element == "a" and link.by == "name"
+                else link
+                for link in inputs.links
+            ]
+
+    # --- which body -----------------------------------------------------------------------------------
+
+    def _per_body(self, links: list[Link]) -> bool:
+        """Return whether each body gets an instance: nothing in the FMU names a body."""
+        named = any(link.body >= 0 for link in links)
+        return not named and len(self._bodies) > 1
+
+    def _bodies_of(self, side: _Side, per_body: bool) -> list[Link]:
+        """Return the links with the body that each belongs to."""
+        links = []
+        for link in side.links:
+            if link.body < 0 and not per_body and len(self._bodies) > 1 and link.quantity not in _GLOBAL:
+                self._problem(
+                    f"{side.causality} {link.element}",
+                    "the name of a body in it, because other variables have one",
+                    "none",
+                    f'Write "{link.element}" = "{self._bodies[0]}.{link.quantity}…" in fmu.variables.',
+                )
+            links.append(replace(link, body=max(link.body, 0)))
+        return links
+
+    # --- what must hold -------------------------------------------------------------------------------
+
+    def _unmapped(self, variable: Variable, element: str) -> None:
+        kind = variable.type if not variable.unit else f"{variable.type} [{variable.unit.name}]"
+        start = "a value in fmu.start"
+        if not variable.real:
+            expected = f"{start}, because it is no Float64"
+            self._problem(
+                f"input {element}", expected, f"none, for a {kind}", f'Write start."{variable.name}" = …'
+            )
+            return
+        near = self._candidates(variable, element)
+        self._problem(
+            f"input {element}",
+            "a name that tells what it is, an entry in fmu.variables, or " + start,
+            f"none of them, for a {kind}",
+            f'Nearest: {", ".join(near)}. Write "{element}" = "{near[0]}" under fmu.variables.',
+        )
+
+    def _candidates(self, variable: Variable, element: str) -> list[str]:
+        """Return the quantities whose words and unit are nearest."""
+        alike = likeness(element, variable.causality)
+        quantities = INPUTS if variable.causality == "input" else OUTPUTS
+        if variable.unit is not None:
+            for name in alike:
+                if not isinstance(to_si(variable.unit, exponents(name, 0)), str):
+                    alike[name] += 1.0
+        found = re.search(r"[._\[]?([xyz123])\]?$", element)
+        names = sorted(alike, key=lambda name: -alike[name])[:3]
+        near = []
+        for name in names:
+            components = quantities[name].components
+            letter = (
+                "xyz"["123".index(found[1])] if found and found[1] in "123" else found[1] if found else ""
+            )
+            component = letter if letter in components else components[0]
+            near.append(f"{name}.{component}" if component else name)
+        return near
+
+    def _twice(self, outputs: list[Link]) -> None:
+        first: dict[tuple[str, int, int], Link] = {}
+        for link in outputs:
+            other = first.setdefault(link.target, link)
+            if other is not link:
+                label = OUTPUTS[link.quantity].label(link.component)
+                self._problem(
+                    f"output {link.element}",
+                    "a quantity of its own",
+                    f"{link.quantity}{label} of the same body as {other.element}",
+                    f'Write "{link.element}" = "none" under fmu.variables, or what it is.',
+                )
+
+    def _complete(self, outputs: list[Link], per_body: bool, ignored: list[str]) -> None:
+        """Check that every body gets a force or a torque."""
+        acted = {link.body for link in outputs if link.quantity in ("force", "torque")}
+        for index, name in enumerate(self._bodies[:1] if per_body else self._bodies):
+            if index not in acted:
+                has = f"none (outputs without a meaning: {', '.join(ignored[:8]) or 'none'})"
+                what = "an output with a force or a torque" + ("" if per_body else f" on {name}")
+                self._problem(
+                    "outputs",
+                    what,
+                    has,
+                    "Map one under fmu.variables, or leave the body to another provider.",
+                )
+
+
+def _moves(quantity: str) -> bool:
+    """Return whether the quantity depends on the point of the body that it is taken at."""
+    return quantity in ("position", "velocity", "relative_velocity", "acceleration", "force")
+
+
+def _affine(causality: str, unit: tuple[float, float], entry: FmuVariable) -> tuple[float, float]:
+    """Put unit, scale and offset together; exact where there is nothing to convert."""
+    factor, shift = unit
+    if causality == "input":
+        return entry.scale / factor, (entry.offset - shift) / factor
+    return entry.scale * factor, entry.scale * shift + entry.offset

@@ -1,0 +1,111 @@
+"""What a worker has to know to run the instances of one FMU, and the memory that it shares with its host."""
+
+from __future__ import annotations
+
+import json
+import mmap
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+_NAME = 48  # bytes for the name of the FMI function under way
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Values for one variable before initialisation; ``type`` is FMI's."""
+
+    name: str
+    reference: int
+    type: str
+    values: tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How to run an FMU; goes to the worker as JSON.
+
+    Attributes:
+        file: what errors call it.
+        folder: where it is unpacked.
+        version: of FMI, 2 or 3.
+        interface: ``cs`` or ``me``.
+        instances: names of the instances, which all do the same.
+        structural, start: values to set in configuration mode, and before initialisation.
+        inputs, outputs: value references of the variables that are exchanged.
+        input_size, output_size: number of their values (more than variables where there are arrays).
+        variable_step: whether communication steps may differ; else they are all the same number.
+        event_mode: whether it has one (Co-Simulation, FMI 3).
+        states, indicators: number of continuous states and event indicators (Model Exchange).
+        completed_step: whether it wants to be told about the end of integrator steps (Model Exchange).
+        state: how its memory can be kept: not at all, inside its process, or as bytes.
+        log_categories: to ask for; empty for all.
+        step_ns: communication step of the run [ns].
+        own_ns: step of the FMU [ns]; equal to, a part of, or a multiple of ``step_ns``.
+        memory: the most that the FMU may take besides what the worker had at first [B].
+    """
+
+    file: str
+    folder: str
+    version: int
+    interface: Literal["cs", "me"]
+    identifier: str
+    token: str
+    instances: tuple[str, ...]
+    structural: tuple[Setting, ...]
+    start: tuple[Setting, ...]
+    inputs: tuple[int, ...]
+    outputs: tuple[int, ...]
+    input_size: int
+    output_size: int
+    variable_step: bool
+    event_mode: bool
+    states: int
+    indicators: int
+    completed_step: bool
+    state: Literal["none", "process", "bytes"]
+    log_categories: tuple[str, ...]
+    step_ns: int
+    own_ns: int
+    memory: int
+
+    def to_json(self) -> bytes:
+        """Return the plan for the worker."""
+        return json.dumps(asdict(self)).encode()
+
+    @classmethod
+    def from_json(cls, text: bytes) -> Plan:
+        """Return the plan that ``to_json`` wrote."""
+        data = json.loads(text)
+        for key in ("structural", "start"):
+            data[key] = tuple(Setting(**{**entry, "values": tuple(entry["values"])}) for entry in data[key])
+        for key in ("instances", "inputs", "outputs", "log_categories"):
+            data[key] = tuple(data[key])
+        return cls(**data)
+
+    @property
+    def memory_size(self) -> int:
+        """Bytes that host and worker share."""
+        return _NAME + 8 * len(self.instances) * (2 * self.input_size + self.output_size)
+
+    def places(self) -> tuple[int, int, int]:
+        """Return where accepted inputs, inputs and outputs begin in the shared memory [B]."""
+        inputs = 8 * len(self.instances) * self.input_size
+        return _NAME, _NAME + inputs, _NAME + 2 * inputs
+
+
+class Marker:
+    """Writes the FMI function under way into the shared memory, for who comes to look after a crash."""
+
+    def __init__(self, memory: mmap.mmap) -> None:
+        self._memory = memory
+        self._padded: dict[str, bytes] = {}
+
+    def __call__(self, function: str) -> None:
+        padded = self._padded.get(function)
+        if padded is None:
+            padded = self._padded[function] = function.encode()[:_NAME].ljust(_NAME, b"\0")
+        self._memory[:_NAME] = padded
+
+    def read(self) -> str:
+        """Return the function that was called last."""
+        return bytes(self._memory[:_NAME]).rstrip(b"\0").decode(errors="replace")

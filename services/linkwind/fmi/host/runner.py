@@ -1,0 +1,198 @@
+"""The instances of one FMU, and when they step: the same code in a worker process and in the host's own."""
+
+from __future__ import annotations
+
+import mmap
+import struct
+from collections.abc import Callable
+from enum import Enum, auto
+from typing import Any
+
+from linkwind.fmi.host.binding import Binding, CallError, Log
+from linkwind.fmi.host.cosimulation import CoSimulation
+from linkwind.fmi.host.modelexchange import ModelExchange
+from linkwind.fmi.host.plan import Marker, Plan
+
+_STEPPERS: dict[str, Callable[[Binding, Plan], CoSimulation | ModelExchange]] = {
+    "cs": CoSimulation,
+    "me": ModelExchange,
+}
+_HEAD = struct.Struct("<8sBqqI")  # magic, mode, start and present time [ns], instances
+_MAGIC = b"LWHOST1\0"
+_KEPT = 4  # states that stay in the process where they cannot be bytes
+
+
+class Mode(Enum):
+    """Where the instances are in their life."""
+
+    INSTANTIATED = auto()
+    INITIALISATION = auto()
+    STEPPING = auto()
+
+
+class Runner:
+    """Runs the instances of a plan. After a CallError nothing else may be called."""
+
+    def __init__(self, plan: Plan, memory: mmap.mmap, log: Log) -> None:
+        """Load, instantiate, and set what is set before initialisation."""
+        self._plan = plan
+        self._memory = memory
+        self._mark = Marker(memory)
+        self._bindings = [
+            Binding(plan, number, memory, self._mark, log) for number in range(len(plan.instances))
+        ]
+        self._steppers = [_STEPPERS[plan.interface](binding, plan) for binding in self._bindings]
+        self._kept: dict[int, list[Any]] = {}
+        self._next_kept = 0
+        self._now = self._start = 0
+        self._configure()
+
+    def _configure(self) -> None:
+        for binding in self._bindings:
+            binding.configure(self._plan.structural)
+            binding.set(self._plan.start)
+        self._mode = Mode.INSTANTIATED
+
+    def evaluate(self, time_ns: int) -> None:
+        """Bring the outputs to the time [ns], with the inputs that lie in the shared memory.
+
+        The first call initialises, and reads the outputs in initialisation mode. Later ones step, or set the
+        inputs again where the time is the same; with an FMU that steps more rarely the outputs are held.
+        """
+        if self._mode is Mode.INSTANTIATED:
+            self._now = self._start = time_ns
+            for binding in self._bindings:
+                binding.enter_initialisation(time_ns / 1e9)
+            self._mode = Mode.INITIALISATION
+        elif time_ns == self._now:
+            pass
+        elif time_ns > self._now:
+            self._advance(time_ns)
+            return
+        else:
+            raise CallError(f"expected a time after {self._now / 1e9:.9g} s; got {time_ns / 1e9:.9g} s")
+        for binding, stepper in zip(self._bindings, self._steppers, strict=True):
+            stepper.reread(time_ns / 1e9)
+            binding.get_outputs()
+
+    def _advance(self, time_ns: int) -> None:
+        """Step every instance to the time, in steps of its own size."""
+        self._begin()
+        own = self._plan.own_ns
+        if own == self._plan.step_ns:
+            own = time_ns - self._now
+        elif (time_ns - self._start) % own:
+            return  # between its steps: the outputs are held
+        while self._now < time_ns:
+            end_ns = self._now + own
+            t, end, h = self._now / 1e9, end_ns / 1e9, own / 1e9
+            for stepper in self._steppers:
+                stepper.advance(t, end, h)
+            self._now = end_ns
+        for binding in self._bindings:
+            binding.get_outputs()
+
+    def _begin(self) -> None:
+        """Leave initialisation mode, if not yet done."""
+        if self._mode is Mode.INITIALISATION:
+            for stepper in self._steppers:
+                stepper.begin(self._now / 1e9)
+            self._mode = Mode.STEPPING
+
+    # --- memory ---------------------------------------------------------------------------------------
+
+    def save(self) -> bytes:
+        """Return all memory: of the instances, and which outputs are held."""
+        if self._mode is Mode.INSTANTIATED:
+            return _HEAD.pack(_MAGIC, 0, 0, 0, len(self._bindings))
+        self._begin()  # so that the state is always one of step mode
+        outputs = bytes(self._memory[self._plan.places()[2] :])
+        parts = [_HEAD.pack(_MAGIC, 1, self._start, self._now, len(self._bindings)), outputs]
+        for stepper, state in zip(self._steppers, self._states(), strict=True):
+            memory = stepper.memory()
+            parts += [struct.pack(f"<II{len(memory)}d", len(memory), len(state), *memory), state]
+        return b"".join(parts)
+
+    def _states(self) -> list[bytes]:
+        """Return each instance's state as bytes, or as the number under which it is kept."""
+        handles = [binding.keep() for binding in self._bindings]
+        if self._plan.state == "bytes":
+            blobs = []
+            for binding, handle in zip(self._bindings, handles, strict=True):
+                blobs.append(binding.to_bytes(handle))
+                binding.drop(handle)
+            return blobs
+        self._next_kept += 1
+        self._kept[self._next_kept] = handles
+        for binding, handle in zip(self._bindings, self._kept.pop(self._next_kept - _KEPT, []), strict=False):
+            binding.drop(handle)
+        return [struct.pack("<q", self._next_kept)] * len(handles)
+
+    def restore(self, blob: bytes) -> None:
+        """Take back what ``save`` returned.
+
+        Raises:
+            CallError: also if the blob is damaged or of another FMU.
+        """
+        try:
+            magic, begun, start, now, count = _HEAD.unpack_from(blob)
+        except struct.error:
+            raise CallError("the checkpoint is not one of a hosted FMU") from None
+        if magic != _MAGIC or count != len(self._bindings):
+            raise CallError("the checkpoint is not one of these instances")
+        if not begun:
+            self._fresh()
+            return
+        outputs_at = self._plan.places()[2]
+        held = len(self._memory) - outputs_at
+        memories, states = self._split(blob[_HEAD.size + held :])
+        if self._mode is Mode.INSTANTIATED:
+            for binding in self._bindings:
+                binding.enter_initialisation(start / 1e9)
+            self._mode = Mode.INITIALISATION
+        self._begin()
+        for i, binding in enumerate(self._bindings):
+            self._put(binding, i, states[i])
+            self._steppers[i].remember(memories[i])
+            self._steppers[i].after_restore()
+        self._memory[outputs_at:] = blob[_HEAD.size : _HEAD.size + held]
+        self._start, self._now = start, now
+
+    def _split(self, rest: bytes) -> tuple[list[list[float]], list[bytes]]:
+        memories, states = [], []
+        try:
+            for _ in self._bindings:
+                numbers, size = struct.unpack_from("<II", rest)
+                memories.append(list(struct.unpack_from(f"<{numbers}d", rest, 8)))
+                begin = 8 + 8 * numbers
+                states.append(rest[begin : begin + size])
+                rest = rest[begin + size :]
+        except struct.error:
+            raise CallError("the checkpoint is cut off") from None
+        return memories, states
+
+    def _put(self, binding: Binding, number: int, state: bytes) -> None:
+        if self._plan.state == "bytes":
+            handle = binding.from_bytes(state)
+            binding.go_back(handle)
+            binding.drop(handle)
+            return
+        key = struct.unpack("<q", state)[0] if len(state) == 8 else -1
+        if key not in self._kept:
+            raise CallError("the state is no longer kept: this FMU cannot write its state as bytes")
+        binding.go_back(self._kept[key][number])
+
+    def _fresh(self) -> None:
+        """Go back to before the first evaluation."""
+        if self._mode is Mode.STEPPING:
+            for binding in self._bindings:
+                binding.reset()
+            self._configure()
+
+    def close(self) -> None:
+        """Terminate and free every instance."""
+        for handles in self._kept.values():
+            for binding, handle in zip(self._bindings, handles, strict=True):
+                binding.drop(handle)
+        for binding in self._bindings:
+            binding.free(terminate=self._mode is Mode.STEPPING)
