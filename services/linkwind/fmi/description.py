@@ -18,12 +18,9 @@ from linkwind.fmi.variables import Dependence, Variable
 FmiVersion = Literal["2", "3"]
 
 LOG_CATEGORIES = {
-    "logEvents": "Changes of state: initialised, terminated, reset",
     "logStatusWarning": "Calls that return Warning",
-    "logStatusDiscard": "Calls that return Discard",
+    "logStatusDiscard": "Calls that return Discard: a step that cannot be done",
     "logStatusError": "Calls that return Error: wrong use, values that make no sense",
-    "logStatusFatal": "Calls that return Fatal",
-    "logAll": "Everything",
 }
 # A list of dependencies that is longer is left out, which means "on everything": quadratic in the bodies.
 LONGEST_LIST = 2000
@@ -81,34 +78,54 @@ def _about(part: Part, version: FmiVersion, token: str) -> dict[str, str]:
 
 
 def _interfaces(root: ET.Element, part: Part, version: FmiVersion, sources: Sequence[str]) -> None:
-    if version == "2":
-        shared = {
-            "modelIdentifier": part.identifier,
-            "canGetAndSetFMUstate": "true",
-            "canSerializeFMUstate": "true",
-            "providesDirectionalDerivative": "true",
-        }
-        step = {"canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": "true"}
-        step |= {"maxOutputDerivativeOrder": "1"}
-        for name, own in (("ModelExchange", dict[str, str]()), ("CoSimulation", step)):
-            files = ET.SubElement(ET.SubElement(root, name, shared | own), "SourceFiles")
-            for source in sources:
-                ET.SubElement(files, "File", name=source)
-        return
+    """Write what the C layers can do; a force model has neither states nor use for derivatives of inputs."""
+    write = _interfaces_2 if version == "2" else _interfaces_3
+    mechanism = part.provider is None
+    headings = part.provider is not None and part.provider.model == "field"  # unwrapped from step to step
+    write(root, part.identifier, mechanism, headings, sources)
+
+
+def _interfaces_2(
+    root: ET.Element, identifier: str, mechanism: bool, headings: bool, sources: Sequence[str]
+) -> None:
     shared = {
-        "modelIdentifier": part.identifier,
+        "modelIdentifier": identifier,
+        "canGetAndSetFMUstate": "true",
+        "canSerializeFMUstate": "true",
+        "providesDirectionalDerivative": "true",
+    }
+    exchange = {"completedIntegratorStepNotNeeded": _boolean(not headings)}
+    step = {"canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": _boolean(mechanism)}
+    step |= {"maxOutputDerivativeOrder": "1"} if mechanism else {}
+    for name, own in (("ModelExchange", exchange), ("CoSimulation", step)):
+        files = ET.SubElement(ET.SubElement(root, name, shared | own), "SourceFiles")
+        for source in sources:
+            ET.SubElement(files, "File", name=source)
+
+
+def _interfaces_3(
+    root: ET.Element, identifier: str, mechanism: bool, headings: bool, sources: Sequence[str]
+) -> None:
+    """Sources are listed in ``buildDescription.xml``."""
+    shared = {
+        "modelIdentifier": identifier,
         "canGetAndSetFMUState": "true",
         "canSerializeFMUState": "true",
         "providesDirectionalDerivatives": "true",
         "providesAdjointDerivatives": "true",
     }
-    ET.SubElement(root, "ModelExchange", shared)
+    ET.SubElement(root, "ModelExchange", shared | {"needsCompletedIntegratorStep": _boolean(headings)})
     step = {
         "canHandleVariableCommunicationStepSize": "true",
         "providesIntermediateUpdate": "true",
         "canReturnEarlyAfterIntermediateUpdate": "true",
     }
+    step |= {"maxOutputDerivativeOrder": "1"} if mechanism else {}
     ET.SubElement(root, "CoSimulation", shared | step)
+
+
+def _boolean(value: bool) -> str:
+    return "true" if value else "false"
 
 
 def _units(root: ET.Element, quantities: Iterable[Quantity]) -> None:
@@ -205,7 +222,9 @@ def _structure_3(root: ET.Element, variables: list[Variable], index: dict[str, i
 
 def _unknowns(variables: list[Variable]) -> list[tuple[str, list[Variable], bool]]:
     outputs = [variable for variable in variables if variable.causality == "output"]
+    # In the order of the continuous states of the C layers: all q, then all v.
     derivatives = [variable for variable in variables if variable.derivative_of]
+    derivatives.sort(key=lambda variable: (variable.section, variable.offset))
     initial = [variable for variable in variables if variable.initial == "calculated"]
     return [
         ("Output", outputs, False),

@@ -100,7 +100,7 @@ def _aero(part: Part) -> tuple[Rows, Rows]:
     for k in range(STEPS):
         _move(motion, start, k, planar=part.scenario.planar)
         inputs.append(_flat({name: rows[which] for name, rows in _motion_sections(motion).items()}))
-        t = (k + 1) * part.scenario.coupling.step_ns / 1e9
+        t = k * part.step + part.step  # the FMU's: communication point and step size added
         model.evaluate(t, motion, wrench)
         model.commit(t, motion)
         if (k + 1) % EVERY == 0:

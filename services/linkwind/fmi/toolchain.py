@@ -114,13 +114,16 @@ def _system() -> list[str]:
 
 
 def run(arguments: Sequence[str], folder: Path, purpose: str) -> None:
-    """Run a compiler in ``folder``.
+    """Run a compiler in ``folder``, which also takes what zig would keep for later.
 
     Raises:
         InputError: it fails; its messages are in the error.
     """
+    environment = os.environ | {"ZIG_LOCAL_CACHE_DIR": str(folder / "zig-cache")}
     try:
-        done = subprocess.run(arguments, cwd=folder, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            arguments, cwd=folder, env=environment, capture_output=True, text=True, check=False
+        )
     except OSError as error:
         raise InputError(
             f"{purpose}: {arguments[0]} cannot be started: {error.strerror}. Check $CC."

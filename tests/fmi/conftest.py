@@ -1,0 +1,68 @@
+"""FMUs that several tests share: each is made once."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.util import find_spec
+
+import pytest
+
+from linkwind.fmi.export import Exported, content_of, export
+from linkwind.scenario import builtin_names, load
+from tests.fmi.scenes import spatial
+
+# part, version of FMI, arrays
+FORMS = [
+    (part, fmi, arrays)
+    for part in ("dynamics", "aero")
+    for fmi, arrays in (("2", "native"), ("3", "native"), ("3", "scalar"))
+]
+SCENARIOS = ("spatial", *builtin_names())
+
+
+@cache
+def scenario(name: str):
+    return spatial() if name == "spatial" else load(name)
+
+
+@pytest.fixture(scope="session")
+def fmu(tmp_path_factory):
+    """Return a function: the file of an FMU for this machine."""
+    folder = tmp_path_factory.mktemp("fmus")
+
+    @cache
+    def make(name="two_link", fmi="3", part="dynamics", arrays="native"):
+        out = folder / f"{name}-{fmi}-{part}-{arrays}.fmu"
+        return export(scenario(name), out, fmi=fmi, part=part, arrays=arrays).file
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def unpacked(tmp_path_factory):
+    """Return a function: a folder with everything of an FMU but binaries."""
+
+    @cache
+    def make(name, part, fmi, arrays):
+        folder = tmp_path_factory.mktemp("unpacked")
+        for path, content in content_of(scenario(name), fmi=fmi, part=part, arrays=arrays).items():
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / path).write_bytes(content)
+        return folder
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def everywhere(tmp_path_factory):
+    """Return a function: the FMU of two_link by version of FMI, for all platforms (2: macOS)."""
+    if find_spec("ziglang") is None:
+        pytest.skip("ziglang is not installed: pip install 'linkwind[fmu]'")
+    folder = tmp_path_factory.mktemp("everywhere")
+
+    @cache
+    def make(fmi) -> Exported:
+        platforms = ["all"] if fmi == "3" else ["x86_64-darwin", "aarch64-darwin"]
+        return export(scenario("two_link"), folder / f"all{fmi}.fmu", fmi=fmi, platforms=platforms)
+
+    return make

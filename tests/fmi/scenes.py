@@ -1,0 +1,103 @@
+"""A 3-D mechanism with every kind of joint, and what it is exported as."""
+
+from __future__ import annotations
+
+from linkwind.scenario import Scenario, loads
+
+SPATIAL = """
+[time]
+end = 0.2
+[environment]
+gravity = [0.3, -9.81, 0.5]
+[[bodies]]
+name = "hub"
+mass = 2.0
+inertia = [0.3, 0.5, 0.6, 0.02, -0.01, 0.03]
+position = [0.1, 0.2, 0.3]
+orientation = [0.8, 0.0, 0.6, 0.0]
+velocity = [0.4, -0.2, 0.1]
+angular_velocity = [0.2, 0.5, -0.3]
+[[bodies]]
+name = "arm"
+mass = 1.0
+inertia = [0.1, 0.12, 0.2, 0.0, 0.0, 0.0]
+orientation = [0.96, 0.28, 0.0, 0.0]
+angular_velocity = [0.6, -0.3, 0.4]
+[[bodies]]
+name = "flap"
+mass = 0.7
+inertia = [0.05, 0.04, 0.06, 0.0, 0.0, 0.0]
+[[bodies]]
+name = "slider"
+mass = 0.5
+inertia = [0.02, 0.03, 0.02, 0.0, 0.0, 0.0]
+[[bodies]]
+name = "lid"
+mass = 0.2
+inertia = [0.01, 0.01, 0.015, 0.0, 0.0, 0.0]
+[[bodies]]
+name = "sledge"
+mass = 1.2
+inertia = [0.1, 0.1, 0.1, 0.0, 0.0, 0.0]
+velocity = [0.3, 0.1, 0.0]
+angular_velocity = [0.0, 0.0, 0.7]
+[[joints]]
+name = "ball"
+type = "spherical"
+parent = "hub"
+child = "arm"
+parent_point = [0.3, 0.1, 0.0]
+child_point = [-0.2, 0.0, 0.05]
+stiffness = 3.0
+damping = 0.1
+[[joints]]
+name = "flap"
+type = "revolute"
+parent = "arm"
+child = "flap"
+parent_point = [0.2, 0.0, 0.0]
+child_point = [-0.2, 0.0, 0.0]
+axis = [0.3, 0.4, 1.0]
+stiffness = 2.0
+[[joints]]
+name = "rail"
+type = "prismatic"
+parent = "hub"
+child = "slider"
+parent_point = [0.0, 0.2, 0.0]
+axis = [0.0, 1.0, 0.5]
+stiffness = 5.0
+damping = 0.2
+[[joints]]
+name = "glue"
+type = "fixed"
+parent = "slider"
+child = "lid"
+parent_point = [0.0, 0.1, 0.0]
+child_point = [0.0, -0.05, 0.0]
+[[joints]]
+name = "ground"
+type = "planar"
+parent = "world"
+child = "sledge"
+child_point = [0.05, 0.0, 0.0]
+stiffness = [1.0, 2.0, 0.5]
+[aero]
+model = "field"
+[aero.field.hub]
+fx = "-2*vx + x"
+ty = "0.1*sin(7*t)"
+[aero.field.arm]
+tz = "-0.3*wz + cos(theta)"
+[dynamics]
+integrator = "rk4"
+substeps = 2
+[coupling]
+scheme = "explicit"
+step = 1e-3
+"""
+
+
+def spatial() -> Scenario:
+    """Return the scenario; the joint that carries the flap has the flap's name."""
+    return loads(SPATIAL, "spatial")
