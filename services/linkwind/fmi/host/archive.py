@@ -71,7 +71,11 @@ class Archive:
             raise InputError(f"{path}: expected an FMU; got: {error.strerror}. Check the path.") from None
         except Exception as error:  # zipfile raises many kinds for damaged archives
             raise self._refuse("an FMU (a zip archive)", f"a file that is none: {error}") from None
-        self._check(entries)
+        try:
+            self._check(entries)
+        except InputError:
+            self._zip.close()
+            raise
         self.names = frozenset(entry.filename for entry in entries if not entry.is_dir())
 
     def _refuse(

@@ -112,7 +112,7 @@ def plan(
         outputs=tuple(variable.reference for variable in mapping.output_variables),
         input_size=len(mapping.inputs),
         output_size=sum(variable.size for variable in mapping.output_variables),
-        variable_step=can.variable_step and settings.step is None,
+        variable_step=can.variable_step,
         event_mode=can.event_mode,
         states=fmu.states,
         indicators=fmu.indicators,
@@ -133,11 +133,9 @@ def _setting(fmu: Description, name: str, value: Any) -> Setting:
     variable = fmu.named(name)
     item = f'{fmu.path}: fmu.start."{name}"'
     if variable is None or variable.causality in ("independent", "calculatedParameter"):
-        settable = [v.name for v in fmu.variables if v.causality in ("parameter", "input")]
+        settable = [v.name for kind in ("parameter", "input") for v in fmu.variables if v.causality == kind]
         near = ", ".join(get_close_matches(name, settable, 5, 0.3) or settable[:5]) or "none (it has none)"
-        raise InputError(
-            f"{item}: expected one of its parameters and inputs, such as {near}; got another name."
-        )
+        raise InputError(f"{item}: expected a parameter or an input, such as {near}; got another.")
     values = value if isinstance(value, tuple) else (value,)
     if len(values) != variable.size:
         raise InputError(
@@ -149,7 +147,8 @@ def _setting(fmu: Description, name: str, value: Any) -> Setting:
 def _typed(item: str, variable: Variable, value: Any) -> Any:
     is_float = variable.type in ("Real", "Float64", "Float32")
     allowed: tuple[type, ...] = (int, float) if is_float else _TYPES.get(variable.type, (int,))
-    if not isinstance(value, allowed) or (isinstance(value, bool) and bool not in allowed):
+    fits = isinstance(value, allowed) and (bool in allowed or not isinstance(value, bool))
+    if not fits:
         raise InputError(f"{item}: expected a value of type {variable.type}; got {value!r}. Change it.")
     return float(value) if is_float else value
 

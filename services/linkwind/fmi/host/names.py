@@ -53,11 +53,10 @@ _OUTPUT_WORDS = {
 }
 _BODY_FRAME_WORDS = {"relativevelocity", "fluiddynamicforce", "fluiddynamicmoment", "fluiddynamictorque"}
 # Pieces of a name that say nothing: what may stand before a word.
-_NEUTRAL = set(
-    re.findall(
-        r"\w+", "state load wheel body link bodies frame fluid aero hydro input output in out u y com cg"
-    )
-)
+_NEUTRAL = {
+    *("state", "load", "wheel", "body", "bodies", "link", "frame", "fluid", "aero", "hydro"),
+    *("input", "output", "in", "out", "u", "y", "com", "cg"),
+}
 # A single number is about z (planar mechanisms), or along x (the 1-D adaptors of Modelica).
 _SINGLE = {"angular_velocity": 2, "angular_acceleration": 2, "torque": 2} | dict.fromkeys(
     ("position", "velocity", "acceleration", "force"), 0

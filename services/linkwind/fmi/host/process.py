@@ -151,7 +151,8 @@ class WorkerProcess:
                 if kind == b"e":
                     raise self._failure(result.decode(errors="replace"))
         except BlockingIOError:
-            raise self._failure(f"no answer within {self._patience:g} s in {self._call.read()}") from None
+            function = self._call.read() or "its start"
+            raise self._failure(f"no answer within {self._patience:g} s in {function}") from None
         except OSError:
             pass
         except SimulationError:
@@ -197,7 +198,7 @@ class WorkerProcess:
             try:
                 self.request(b"c")
             except SimulationError as error:
-                _log.warning("%s: at the end of the run: %s", self._plan.file, error)
+                _log.warning("%s: at the end of the run: %s", self._plan.file, str(error))
                 return
         self._reap(0.0 if kill else _CLOSE_TIMEOUT)
 

@@ -94,6 +94,7 @@ def main() -> None:
     """Run the worker."""
     descriptor, shared, parent = map(int, sys.argv[1:4])
     _die_with(parent)
+    os.set_inheritable(descriptor, False)  # a process that the FMU starts must not keep the host waiting
     memory = mmap.mmap(shared, 0)
     os.close(shared)
     serve(socket.socket(fileno=descriptor), memory)
