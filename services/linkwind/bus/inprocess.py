@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 
-from linkwind.errors import LinkwindError
+from linkwind.errors import FaultError, LinkwindError
 from linkwind.protocol import DynamicsSession, ProviderSession, fault_error
 
 
@@ -21,6 +21,7 @@ class InProcessLink:
         self._session = session
         self._providers = list(providers)
         self._answers: deque[tuple[str, bytes]] = deque()
+        self._trouble: FaultError | None = None
         try:
             for provider in self._providers:
                 provider.welcome(session.control(provider.hello()))
@@ -32,22 +33,32 @@ class InProcessLink:
 
     def wait(self, done: Callable[[], bool], timeout: float, poll: Callable[[], None]) -> bool:
         """Everything has been said by the time that this is called."""
+        if self._trouble is not None:
+            raise self._trouble
         return done()
 
     def post(self, motion: bytes) -> None:
-        """Let every provider answer."""
+        """Let every provider answer; a failure is heard when the answers are awaited, as over a network."""
         for provider in self._providers:
             try:
                 answer = provider.answer(motion)
             except LinkwindError as error:
-                raise fault_error(provider.fault(error)) from error
+                self._trouble = self._trouble or fault_error(provider.fault(error))
+                self._trouble.__cause__ = self._trouble.__cause__ or error
+                continue
             if answer is None:
                 self._session.control(provider.bye())
             else:
                 self._answers.append((provider.name, answer))
 
     def receive(self) -> tuple[str, bytes]:
-        """Return the next answer."""
+        """Return the next answer.
+
+        Raises:
+            FaultError: a provider reported that it cannot go on.
+        """
+        if not self._answers and self._trouble is not None:
+            raise self._trouble
         return self._answers.popleft()
 
     def fault(self, payload: bytes) -> None:

@@ -4,16 +4,27 @@ from __future__ import annotations
 
 import hashlib
 import math
+from typing import Protocol
 
 import numpy as np
 
 from linkwind.coupling import CommunicationPoint
 from linkwind.log.state import StateEncoder, StepEncoder, TimingEncoder
-from linkwind.log.writer import LogWriter
 from linkwind.mechanism import Mechanism
 from linkwind.native.multibody import Multibody
 from linkwind.scenario import Scenario
 from linkwind.spatial import Array, Motion, Wrench
+
+
+class MessageLog(Protocol):
+    """Where the messages go: the log of a run (:class:`linkwind.log.writer.LogWriter`), or a comparison."""
+
+    def motion(self, payload: bytes, time_ns: int) -> None: ...
+    def wrench(self, provider: str, payload: bytes, time_ns: int) -> None: ...
+    def state(self, payload: bytes, time_ns: int) -> None: ...
+    def step(self, payload: bytes, time_ns: int) -> None: ...
+    def timing(self, payload: bytes, time_ns: int) -> None: ...
+    def scene(self, time_ns: int, motion: Motion, wrench: Wrench) -> None: ...
 
 
 class Recorder:
@@ -25,7 +36,7 @@ class Recorder:
     """
 
     def __init__(
-        self, log: LogWriter, scenario: Scenario, mechanism: Mechanism, multibody: Multibody
+        self, log: MessageLog, scenario: Scenario, mechanism: Mechanism, multibody: Multibody
     ) -> None:
         n = multibody.n
         self.joint_gap_max = 0.0

@@ -39,11 +39,20 @@ class Span(NamedTuple):
     end: int
 
 
+class SchemaInfo(NamedTuple):
+    """A message type: its name, how it is defined, and the definition."""
+
+    name: str = ""
+    encoding: str = ""
+    data: bytes = b""
+
+
 class ChannelInfo(NamedTuple):
-    """A channel: its topic and the name of its message type."""
+    """A channel: its topic, message type, and how messages are encoded."""
 
     topic: str
-    schema: str
+    schema: SchemaInfo
+    encoding: str
 
 
 def record_at(data: Data, at: int) -> Span | None:
@@ -107,7 +116,7 @@ def messages_of(
     """
     record, message = _RECORD.unpack_from, _MESSAGE.unpack_from
     found: list[Message] = []
-    schemas: dict[int, str] = {}
+    schemas: dict[int, SchemaInfo] = {}
     at, end = 0, len(records)
     while at < end:
         opcode, length, channel = record(records, at)
@@ -122,12 +131,13 @@ def messages_of(
 
 
 def add_channel(
-    opcode: int, content: bytes, schemas: dict[int, str], channels: dict[int, ChannelInfo]
+    opcode: int, content: bytes, schemas: dict[int, SchemaInfo], channels: dict[int, ChannelInfo]
 ) -> None:
     """Take in a Schema or a Channel record; a channel follows its schema."""
     if opcode == Opcode.SCHEMA:
         schema = parsed(Schema, content)
-        schemas[schema.id] = schema.name
+        schemas[schema.id] = SchemaInfo(schema.name, schema.encoding, schema.data)
     elif opcode == Opcode.CHANNEL:
         channel = parsed(Channel, content)
-        channels.setdefault(channel.id, ChannelInfo(channel.topic, schemas.get(channel.schema_id, "")))
+        schema = schemas.get(channel.schema_id, SchemaInfo())
+        channels.setdefault(channel.id, ChannelInfo(channel.topic, schema, channel.message_encoding))

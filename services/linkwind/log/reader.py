@@ -75,6 +75,7 @@ class Log:
         path: of the file.
         damage: what is missing, None for a file that is whole.
         topics: number of readable messages by topic.
+        channels: by number, as in :meth:`messages`.
         metadata: run id, schema hash and what the writer was given besides.
         versions: of the programs that made the log, and the processor.
     """
@@ -84,9 +85,9 @@ class Log:
         self._data = data
         self._contents = scan(data)
         self._check_origin()
-        self._channels: dict[int, ChannelInfo] = dict(self._contents.channels)
+        self.channels: dict[int, ChannelInfo] = dict(self._contents.channels)
         counts = self._counts()
-        self.topics = {self._channels[number].topic: counts[number] for number in sorted(counts)}
+        self.topics = {self.channels[number].topic: counts[number] for number in sorted(counts)}
         self._check_schemas()
         self.metadata: dict[str, str] = self._contents.metadata.get(contents.RUN, {})
         self.versions: dict[str, str] = self._contents.metadata.get(contents.VERSIONS, {})
@@ -101,11 +102,11 @@ class Log:
             )
 
     def _check_schemas(self) -> None:
-        for topic, schema in self._channels.values():
+        for topic, schema, _ in self.channels.values():
             name = contents.message_name(topic)
-            if name is not None and schema != contents.PACKAGE + name:
+            if name is not None and schema.name != contents.PACKAGE + name:
                 raise LogError(
-                    f'{self.path}: {topic}: expected schema {contents.PACKAGE}{name}; got "{schema}". '
+                    f'{self.path}: {topic}: expected schema {contents.PACKAGE}{name}; got "{schema.name}". '
                     "Read this log with the version of linkwind that wrote it."
                 )
 
@@ -120,7 +121,7 @@ class Log:
         for channel, sequence, _, _ in self._messages():
             counts[channel] = counts.get(channel, 0) + 1
             last[channel] = sequence
-        known = {number: count for number, count in counts.items() if number in self._channels}
+        known = {number: count for number, count in counts.items() if number in self.channels}
         all_written = sum(last.values() if written is None else written.values())
         self.damage = Damage(
             sum(gap.size for gap in gaps),
@@ -134,7 +135,7 @@ class Log:
         for chunk in self._contents.chunks:
             records = chunk_records(self._data, chunk, verified=self._contents.verified)
             if records is not None:  # they were read before
-                yield from messages_of(records, self._channels, wanted)
+                yield from messages_of(records, self.channels, wanted)
 
     @property
     def run(self) -> str:
@@ -201,13 +202,17 @@ class Log:
 
     def raw(self, *topics: str) -> Iterator[RawMessage]:
         """Iterate over the readable messages in the order of logging: of ``topics``, or all."""
-        names = {
-            number: channel.topic
-            for number, channel in self._channels.items()
-            if not topics or channel.topic in topics
-        }
-        for channel, _, time_ns, payload in self._messages(names):
-            yield RawMessage(names[channel], time_ns, payload)
+        for channel, _, time_ns, payload in self.messages(*topics):
+            yield RawMessage(self.channels[channel].topic, time_ns, payload)
+
+    def messages(self, *topics: str) -> Iterator[Message]:
+        """Iterate like :meth:`raw` over channel, number, simulation time [ns] and payload.
+
+        The number counts the messages of a channel from 1, in a damaged log those that are lost as well.
+        """
+        return self._messages(
+            {n for n, channel in self.channels.items() if not topics or channel.topic in topics}
+        )
 
     def decoded(self, *topics: str) -> Iterator[DecodedMessage]:
         """Iterate like :meth:`raw` over parsed messages of ``linkwind.v1``; pictures are left out.

@@ -18,6 +18,7 @@ from linkwind.log.chunks import (
     MAGIC,
     ChannelInfo,
     Data,
+    SchemaInfo,
     Span,
     add_channel,
     chunk_records,
@@ -147,7 +148,7 @@ def _read_summary(data: Data, contents: Contents) -> None:
     if zlib.crc32(checked) != footer.summary_crc:
         return
     contents.verified = _verified(data, footer.summary_start)
-    schemas: dict[int, str] = {}
+    schemas: dict[int, SchemaInfo] = {}
     at = footer.summary_start
     while at < footer_at and (record := record_at(data, at)) is not None:
         content = data[record.start : record.end]

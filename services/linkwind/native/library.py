@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import hashlib
 from collections.abc import Callable, Sequence
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 from linkwind.errors import LinkwindError
@@ -18,7 +20,7 @@ def library() -> ctypes.CDLL:
     Raises:
         LinkwindError: the file is missing or cannot be loaded here.
     """
-    path = str(files("linkwind").joinpath("_data", "liblinkwind.so"))
+    path = _path()
     try:
         return ctypes.CDLL(path)
     except OSError as error:
@@ -26,6 +28,15 @@ def library() -> ctypes.CDLL:
             f"{path}: expected the library compiled at install; got {error}. "
             "Install linkwind again (pip install .), or run python fmu/hatch_build.py in a checkout."
         ) from error
+
+
+def library_sha256() -> str:
+    """Return the hash of the library's file: another compiler or other flags may give other bits."""
+    return hashlib.sha256(Path(_path()).read_bytes()).hexdigest()
+
+
+def _path() -> str:
+    return str(files("linkwind").joinpath("_data", "liblinkwind.so"))
 
 
 def declare(name: str, arguments: Sequence[Any], result: Any = ctypes.c_int) -> Callable[..., Any]:

@@ -18,6 +18,7 @@ from linkwind.dynamics.service import DynamicsService, Result
 from linkwind.errors import LinkwindError
 from linkwind.log.writer import LogWriter
 from linkwind.mechanism import build
+from linkwind.native.library import library_sha256
 from linkwind.runs import folder as folders
 from linkwind.runs.children import children
 from linkwind.scenario import Scenario
@@ -149,7 +150,10 @@ def _open_log(path: Path, scenario: Scenario, service: DynamicsService) -> LogWr
         scenario_json=scenario.to_json(),
         body_names=service.mechanism.bodies,
         provider_bodies=service.session.providers,
-        metadata={"tables_sha256": tables_sha256(service.mechanism)},
+        metadata={
+            "tables_sha256": tables_sha256(service.mechanism),
+            "library_sha256": library_sha256(),
+        },
     )
 
 
