@@ -141,10 +141,11 @@ int lw_get_output_derivatives(lw_instance *instance, const uint32_t *references,
     if (found != count)
         return lw_report(instance, LW_FMI_ERROR, "Expected nValues = %lu but was %lu.", (unsigned long)found,
                          (unsigned long)count);
+    double *next = values;
     for (size_t i = 0; i < n; ++i) {
-        int status = output_derivative(instance, references[i], values);
+        int status = output_derivative(instance, references[i], next);
         if (status) return status;
-        values += lw_fmu_variables[references[i]].size;
+        next += lw_fmu_variables[references[i]].size;
     }
-    return LW_FMI_OK;
+    return lw_check_results(instance, values, count);
 }

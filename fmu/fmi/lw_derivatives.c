@@ -135,7 +135,8 @@ int lw_directional_derivative(lw_instance *instance, lw_variables unknowns, lw_v
         if (!isfinite(instance->direction[k]))
             return lw_report(instance, LW_FMI_ERROR, "%s: Expected a finite seed but was %g.",
                              lw_name_at(LW_TYPE_FLOAT64, (uint32_t)k), instance->direction[k]);
-    return lw_differentiate(instance, unknowns, sensitivity);
+    status = lw_differentiate(instance, unknowns, sensitivity);
+    return status ? status : lw_check_results(instance, sensitivity, unknowns.count);
 }
 
 /* One column of the Jacobian after the other, times the seed. */
@@ -155,5 +156,5 @@ int lw_adjoint_derivative(lw_instance *instance, lw_variables unknowns, lw_varia
             if ((status = differentiate(instance, &target))) return status;
         }
     }
-    return LW_FMI_OK;
+    return lw_check_results(instance, sensitivity, knowns.count);
 }

@@ -80,6 +80,7 @@ int lw_get_float64(lw_instance *, const uint32_t *references, size_t n, double *
 int lw_set_float64(lw_instance *, const uint32_t *references, size_t n, const double *values, size_t count);
 int lw_get_int32(lw_instance *, const uint32_t *references, size_t n, int32_t *values, size_t count);
 int lw_set_int32(lw_instance *, const uint32_t *references, size_t n, const int32_t *values, size_t count);
+int lw_check_results(const lw_instance *, const double *derivatives, size_t count); /* finite? */
 /* Bring groups of calculated values up to date. */
 int lw_update(lw_instance *, unsigned groups);
 size_t lw_state_size(void); /* continuous states */

@@ -200,16 +200,6 @@ static void load_state(lw_instance *instance) {
     part->state[lw_state_size()] = instance->store[PROPOSED];
 }
 
-static int update_motion(lw_instance *instance) {
-    const lw_part *part = instance->part;
-    const double *orientation = AT(ORIENTATION);
-    lw_multibody_motion(part->multibody, part->state, AT(POSITION), AT(ORIENTATION), AT(LINEAR), AT(ANGULAR));
-    for (int i = 0; i < lw_fmu_n; ++i)
-        if (!isfinite(orientation[4 * i]))
-            return lw_report(instance, LW_FMI_DISCARD, "Expected a rotation of body %d but was none.", i);
-    return LW_FMI_OK;
-}
-
 static void split(const double *six, double *linear, double *angular) {
     for (int i = 0; i < lw_fmu_n; ++i) {
         memcpy(linear + 3 * i, six + 6 * i, 3 * sizeof(double));
@@ -232,15 +222,13 @@ static int update_acceleration(lw_instance *instance) {
 
 int lw_part_update(lw_instance *instance, unsigned groups) {
     lw_part *part = instance->part;
-    int status = LW_FMI_OK;
+    lw_multibody *mb = part->multibody;
     load_state(instance);
-    if (groups & RATE)
-        lw_coordinate_rate(part->multibody, part->state, part->state + lw_fmu_nq, AT(DER_Q));
-    if (groups & ENERGY)
-        lw_multibody_energy(part->multibody, part->state, AT(KINETIC_ENERGY), AT(POTENTIAL_ENERGY));
-    if (groups & MOTION) status = update_motion(instance);
-    if (!status && groups & ACCELERATION) status = update_acceleration(instance);
-    return status;
+    if (groups & RATE) lw_coordinate_rate(mb, part->state, part->state + lw_fmu_nq, AT(DER_Q));
+    if (groups & ENERGY) lw_multibody_energy(mb, part->state, AT(KINETIC_ENERGY), AT(POTENTIAL_ENERGY));
+    if (groups & MOTION)
+        lw_multibody_motion(mb, part->state, AT(POSITION), AT(ORIENTATION), AT(LINEAR), AT(ANGULAR));
+    return groups & ACCELERATION ? update_acceleration(instance) : LW_FMI_OK;
 }
 
 int32_t lw_part_output_order(void) { return 1; }

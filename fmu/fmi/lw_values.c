@@ -65,6 +65,17 @@ int lw_update(lw_instance *instance, unsigned groups) {
     return status;
 }
 
+/* What went in was finite: what is not so any more is too large to compute with. */
+static int overflow(const lw_instance *instance, const char *name, double value) {
+    return lw_report(instance, LW_FMI_DISCARD, "%s: Expected a finite result but was %g.", name, value);
+}
+
+int lw_check_results(const lw_instance *instance, const double *values, size_t count) {
+    for (size_t k = 0; k < count; ++k)
+        if (!isfinite(values[k])) return overflow(instance, "derivatives", values[k]);
+    return LW_FMI_OK;
+}
+
 /* ---- Float64 ---- */
 
 int lw_get_float64(lw_instance *instance, const uint32_t *references, size_t n, double *values,
@@ -80,7 +91,10 @@ int lw_get_float64(lw_instance *instance, const uint32_t *references, size_t n, 
     for (size_t i = 0; i < n; ++i) {
         const lw_fmu_variable *v = &lw_fmu_variables[references[i]];
         const double *from = v->type == LW_TYPE_TIME ? &instance->time : instance->values + v->offset;
-        for (uint32_t k = 0; k < v->size; ++k) *values++ = from[k];
+        for (uint32_t k = 0; k < v->size; ++k) {
+            if (!isfinite(from[k])) return overflow(instance, v->name, from[k]);
+            *values++ = from[k];
+        }
     }
     return LW_FMI_OK;
 }
@@ -168,7 +182,7 @@ int lw_get_state_derivatives(lw_instance *instance, double *derivatives, size_t 
     uint32_t first = lw_part_derivatives(instance, &groups);
     if ((status = lw_update(instance, groups))) return status;
     memcpy(derivatives, instance->values + first, count * sizeof(double));
-    return LW_FMI_OK;
+    return lw_check_results(instance, derivatives, count);
 }
 
 /* Metres, radians and quaternions of moderate machines are all of order one. */
