@@ -49,9 +49,11 @@ def shape(variable: ET.Element) -> tuple[int, ...]:
 def test_dimensions_of_arrays(arrays_3):
     expected = {
         "hub.F": (3,), "hub.T": (3,), "hub.A": (6, 6), "hub.r": (3,), "hub.orientation": (4,),
-        "hub.v": (3,), "hub.w": (3,), "hub.a": (3,), "hub.alpha": (3,), "hub.mass": (), "hub.inertia": (6,), "gravity": (3,),
+        "hub.v": (3,), "hub.w": (3,), "hub.a": (3,), "hub.alpha": (3,), "hub.mass": (), "hub.inertia": (6,),
+        "gravity": (3,),
         "world_hub.q_translation": (3,), "world_hub.q_rotation": (4,), "world_hub.v_translation": (3,),
-        "world_hub.v_rotation": (3,), "ball.q": (4,), "ball.v": (3,), "der(ball.q)": (4,), "der(ball.v)": (3,),
+        "world_hub.v_rotation": (3,), "ball.q": (4,), "ball.v": (3,), "der(ball.q)": (4,),
+        "der(ball.v)": (3,),
         "flap_joint.q": (), "flap_joint.v": (), "rail.q": (), "ground.q_translation": (2,),
         "ground.q_rotation": (), "ball.F": (3,), "ball.T": (3,), "glue.F": (3,), "ball.parent_point": (3,),
         "ball.stiffness": (3,), "ball.rest": (4,), "ground.stiffness_rotation": (), "solver.substeps": (),

@@ -23,7 +23,7 @@ LOG_CATEGORIES = {
     "logStatusError": "Calls that return Error: wrong use, values that make no sense",
 }
 # A list of dependencies that is longer is left out, which means "on everything": quadratic in the bodies.
-LONGEST_LIST = 2000
+LONGEST_LIST = 500
 
 
 def model_description(part: Part, version: FmiVersion, token: str, sources: Sequence[str]) -> bytes:

@@ -29,11 +29,12 @@ MAX_SUBSTEPS = 1_000_000
 def variables(scenario: Scenario, mechanism: Mechanism) -> list[Variable]:
     """Return all variables, arrays as arrays, in the order of the model description."""
     structure = Structure(mechanism)
+    state = Multibody(mechanism.tables).initial_state(mechanism.q0, mechanism.v0)
     every = [piece for joint in pieces(mechanism) for piece in joint]
     return [
         TIME,
         *_inputs(mechanism),
-        *(state for piece in every for state in _states(piece, mechanism)),
+        *(variable for piece in every for variable in _states(piece, state, len(mechanism.q0))),
         *_motion(mechanism, structure),
         *_reactions(mechanism, structure),
         *_energies(structure),
@@ -103,9 +104,7 @@ def _inputs(mechanism: Mechanism) -> Iterator[Variable]:
         )  # fmt: skip
 
 
-def _states(piece: Piece, mechanism: Mechanism) -> Iterator[Variable]:
-    nq = len(mechanism.q0)
-    state = Multibody(mechanism.tables).initial_state(mechanism.q0, mechanism.v0)
+def _states(piece: Piece, state: Array, nq: int) -> Iterator[Variable]:
     for what, section, first, count, start in (
         ("q", "Q", piece.q, piece.nq, state[:nq]),
         ("v", "V", piece.v, piece.nv, state[nq:-1]),
@@ -211,15 +210,12 @@ def _body_parameters(mechanism: Mechanism) -> Iterator[Variable]:
 
 def _joint_parameters(mechanism: Mechanism) -> Iterator[Variable]:
     tables = mechanism.tables
-    for i, joint in enumerate(pieces(mechanism)):
-        name, stated = joint_names(mechanism)[i], is_stated(mechanism.joints[i])
-        if not stated:
+    for i, (name, joint) in enumerate(zip(joint_names(mechanism), pieces(mechanism), strict=True)):
+        if not is_stated(mechanism.joints[i]):
             continue
-        for what, section in (("parent_point", "PARENT_POINT"), ("child_point", "CHILD_POINT")):
-            points = tables.parent_point if what == "parent_point" else tables.child_point
-            side = what.partition("_")[0]
+        for side, points in (("parent", tables.parent_point), ("child", tables.child_point)):
             yield parameter(
-                f"{name}.{what}", section, 3 * i, points[i], units.POSITION,
+                f"{name}.{side}_point", f"{side.upper()}_POINT", 3 * i, points[i], units.POSITION,
                 f"Point of joint {name} on its {side}, from the centre of mass, in the body frame",
                 tunable=False,
             )  # fmt: skip

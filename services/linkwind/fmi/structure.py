@@ -22,7 +22,12 @@ class Structure:
         self._pieces = pieces(mechanism)
         self._path = [_path(i, parents) for i in range(len(parents))]
         roots = [path[0] for path in self._path]
-        self._tree = [[k for k, root in enumerate(roots) if root == roots[i]] for i in range(len(roots))]
+        self._root = roots
+        self._accelerations = {root: self._acceleration(self._tree(root)) for root in set(roots)}
+        self._inertias = {root: self._inertia(self._tree(root)) for root in set(roots)}
+
+    def _tree(self, root: int) -> list[int]:
+        return [k for k, own in enumerate(self._root) if own == root]
 
     def position(self, i: int) -> Dependences:
         """Of the centre of mass of body i."""
@@ -50,8 +55,11 @@ class Structure:
 
     def acceleration(self, i: int) -> Dependences:
         """Of accelerations and reactions of body i: on everything in its tree."""
+        return self._accelerations[self._root[i]]
+
+    def _acceleration(self, tree: list[int]) -> Dependences:
         knowns = []
-        for k in self._tree[i]:
+        for k in tree:
             knowns += [piece.called(what) for piece in self._pieces[k] for what in ("q", "v")]
             knowns += [f"{self._bodies[k]}.{what}" for what in ("F", "T", "A")]
         return tuple(map(Dependence, knowns))
@@ -75,16 +83,14 @@ class Structure:
 
     def inertia(self, i: int) -> Dependences:
         """Parameters that accelerations in the tree of body i depend on."""
-        tree = self._tree[i]
+        return self._inertias[self._root[i]]
+
+    def _inertia(self, tree: list[int]) -> Dependences:
         stated = [k for k in tree if self._stated[k]]
         bodies = tuple(Dependence(f"{self._bodies[k]}.{what}") for k in tree for what in ("mass", "inertia"))
         points = self._parameters(stated, "parent_point", "child_point")
-        return (
-            Dependence("gravity"),
-            *bodies,
-            *points,
-            *self._springs(stated, "stiffness", "damping", "rest"),
-        )
+        springs = self._springs(stated, "stiffness", "damping", "rest")
+        return (Dependence("gravity"), *bodies, *points, *springs)
 
     def stored(self) -> Dependences:
         """Parameters of the potential energy."""

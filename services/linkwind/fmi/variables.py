@@ -123,8 +123,8 @@ class Variable:
 
 def scalars(variables: list[Variable]) -> list[Variable]:
     """Return the elements of all variables, each as a variable of its own."""
-    names = {variable.name: element_names(variable) for variable in variables}
-    return [_element(variable, index, names) for variable in variables for index in range(variable.size)]
+    expansion = _Expansion(variables)
+    return [_element(variable, index, expansion) for variable in variables for index in range(variable.size)]
 
 
 def element_names(variable: Variable) -> list[str]:
@@ -137,28 +137,44 @@ def element_names(variable: Variable) -> list[str]:
     return [f"{stem}[{','.join(map(str, indices))}]{ending}" for indices in itertools.product(*ranges)]
 
 
-def _element(variable: Variable, index: int, names: dict[str, list[str]]) -> Variable:
+class _Expansion:
+    """Dependences on arrays, as dependences on their elements.
+
+    Large mechanisms have long lists, which many unknowns share: each is expanded once.
+    """
+
+    def __init__(self, variables: list[Variable]) -> None:
+        self.names = {variable.name: element_names(variable) for variable in variables}
+        self._known: dict[int, tuple[Dependence, ...]] = {}
+
+    def of(self, dependences: tuple[Dependence, ...], index: int) -> tuple[Dependence, ...]:
+        """Return what element ``index`` depends on; the tuples given must live as long as this."""
+        if any(dependence.elementwise for dependence in dependences):
+            return self._expand(dependences, slice(index, index + 1))
+        key = id(dependences)
+        if key not in self._known:
+            self._known[key] = self._expand(dependences, slice(0))
+        return self._known[key]
+
+    def _expand(self, dependences: tuple[Dependence, ...], own: slice) -> tuple[Dependence, ...]:
+        return tuple(
+            Dependence(name, each.kind)
+            for each in dependences
+            for name in (self.names[each.on][own] if each.elementwise else self.names[each.on])
+        )
+
+
+def _element(variable: Variable, index: int, expansion: _Expansion) -> Variable:
     state = variable.derivative_of
     return replace(
         variable,
-        name=names[variable.name][index],
+        name=expansion.names[variable.name][index],
         offset=variable.offset + index,
         dimensions=(),
         quantity=variable.elements[index] if variable.elements else variable.quantity,
         start=variable.start[index : index + 1],
-        derivative_of=names[state][index] if state else "",
-        depends=_elements_of(variable.depends, index, names),
-        initially=_elements_of(variable.initially, index, names),
+        derivative_of=expansion.names[state][index] if state else "",
+        depends=expansion.of(variable.depends, index),
+        initially=expansion.of(variable.initially, index),
         elements=(),
     )
-
-
-def _elements_of(
-    dependences: tuple[Dependence, ...], index: int, names: dict[str, list[str]]
-) -> tuple[Dependence, ...]:
-    found = []
-    for dependence in dependences:
-        all_names = names[dependence.on]
-        on = all_names[index : index + 1] if dependence.elementwise else all_names
-        found += [Dependence(name, dependence.kind) for name in on]
-    return tuple(found)
