@@ -102,7 +102,7 @@ def test_too_many_entries_and_too_much(tmp_path, good, monkeypatch):
 def test_the_same_entry_twice(tmp_path, good):
     with zipfile.ZipFile(good, "a") as target, pytest.warns(UserWarning, match="Duplicate"):
         target.writestr("modelDescription.xml", "<other/>")
-    with pytest.raises(InputError, match=r'each entry once; got entry "modelDescription\.xml" twice'):
+    with pytest.raises(InputError, match=r'got two different entries "modelDescription\.xml"'):
         description.read(good)
 
 
@@ -162,6 +162,31 @@ def test_damaged_bytes_never_raise_anything_else(tmp_path, good):
         except InputError:
             continue
         assert read.version == 2
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_description_without_any_one_attribute_or_with_nonsense_in_it(tmp_path, fmi):
+    """It is either still understood, or an InputError."""
+    variables = (Variable("vx", "input", unit="km/h"), Variable("Fx", "output"), Variable("k", "parameter"))
+    if fmi == 3:
+        variables += (Variable("n", "structuralParameter"), Variable("T", "output", ("n",)))
+    foreign = Foreign(variables, fmi, ("CoSimulation", "ModelExchange"), states=1, code="#define OUTPUTS(m)")
+    good = fmu(tmp_path, foreign, "good")
+    with zipfile.ZipFile(good) as source:
+        text = source.read("modelDescription.xml").decode()
+    understood = 0
+    for found in re.finditer(r' \w+="[^"]*"', text):
+        name = found[0].split("=")[0]
+        for other in ("", f'{name}="-7"', f'{name}="nonsense"', f'{name}=""'):
+            changed = (text[: found.start()] + other + text[found.end() :]).encode()
+            path = remade(tmp_path, good, lambda entries, new=changed: {"modelDescription.xml": new})
+            try:
+                read = description.read(path)
+                resolve(read, FmuModel(), ("wing",))
+            except InputError:
+                continue
+            understood += 1
+    assert understood > 10
 
 
 def test_no_file_and_no_fmu(tmp_path):

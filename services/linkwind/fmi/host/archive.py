@@ -91,12 +91,12 @@ class Archive:
             raise self._refuse(
                 f"at most {MAX_SIZE >> 30} GiB unpacked", f"{size / 2**30:.1f} GiB: a zip bomb?"
             )
-        seen: set[str] = set()
+        seen: dict[str, tuple[int, int]] = {}  # some tools write an entry twice; twice the same is harmless
         for entry in entries:
             self._check_entry(entry)
-            if entry.filename in seen:
-                raise self._refuse("each entry once", f'entry "{entry.filename}" twice')
-            seen.add(entry.filename)
+            content = (entry.CRC, entry.file_size)
+            if seen.setdefault(entry.filename, content) != content:
+                raise self._refuse("each entry once", f'two different entries "{entry.filename}"')
 
     def _check_entry(self, entry: zipfile.ZipInfo) -> None:
         # orig_filename: zipfile itself turns backslashes and NULs of the name into something harmless.
@@ -142,7 +142,7 @@ class Archive:
         parser.StartDoctypeDeclHandler = doctype
         try:
             parser.Parse(text, True)
-        except expat.ExpatError as error:
+        except (expat.ExpatError, LookupError, ValueError) as error:  # also an encoding that nobody knows
             raise self._refuse(f"{DESCRIPTION} to be well-formed XML", f"{error}") from None
         return text
 
@@ -196,8 +196,9 @@ class Archive:
         wanted = (DESCRIPTION, f"binaries/{platform_name(version)}/", "resources/")
         (folder / "resources").mkdir(parents=True, exist_ok=True)  # FMUs are told its path
         for entry in self._zip.infolist():
-            if not entry.is_dir() and entry.filename.startswith(wanted):
-                self._write(entry, folder / entry.filename)
+            target = folder / entry.filename
+            if not entry.is_dir() and entry.filename.startswith(wanted) and not target.exists():
+                self._write(entry, target)
 
     def _write(self, entry: zipfile.ZipInfo, target: Path) -> None:
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -122,9 +122,18 @@ def read(path: Path, structural: Mapping[str, int] | None = None) -> Description
     finally:
         archive.close()
     parsed, remarks = _parse(path, text)
+    try:
+        return _description(path, parsed, structural or {}, remarks)
+    except (AttributeError, KeyError, TypeError, ValueError) as error:  # something is missing or no number
+        raise _damaged(path, error) from None
+
+
+def _description(
+    path: Path, parsed: Any, structural: Mapping[str, int], remarks: tuple[str, ...]
+) -> Description:
     version = _version(path, parsed)
     units = {unit.name: _unit(unit) for unit in parsed.unitDefinitions}
-    sizes = _structural(path, parsed, structural or {})
+    sizes = _structural(path, parsed, structural)
     experiment = parsed.defaultExperiment
     return Description(
         path=path,

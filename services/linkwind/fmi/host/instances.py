@@ -97,7 +97,8 @@ def plan(
         InputError: a start value does not fit its variable.
     """
     kind, can = interface(fmu, settings)
-    starts = tuple(_setting(fmu, name, value) for name, value in settings.start.items())
+    given = {name: _setting(fmu, name, value) for name, value in settings.start.items()}
+    inputs = {variable.name for variable in fmu.variables if variable.causality == "input"}
     return Plan(
         file=str(fmu.path),
         folder=str(folder),
@@ -107,7 +108,8 @@ def plan(
         token=fmu.token,
         instances=instances,
         structural=tuple(_setting(fmu, name, value) for name, value in settings.structural.items()),
-        start=starts,
+        start=tuple(setting for name, setting in given.items() if name not in inputs),
+        held=tuple(setting for name, setting in given.items() if name in inputs),
         inputs=tuple(variable.reference for variable in mapping.input_variables),
         outputs=tuple(variable.reference for variable in mapping.output_variables),
         input_size=len(mapping.inputs),

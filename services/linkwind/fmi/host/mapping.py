@@ -21,6 +21,7 @@ from linkwind.scenario.providers import FmuModel, FmuVariable
 
 Vector3 = tuple[float, float, float]
 SHOWN = 6  # problems in one error
+_LEFT = ("Clock", "Binary")  # types that keep what the FMU starts with
 _GLOBAL = ("density", "wind")  # belong to no body in particular
 
 
@@ -177,7 +178,7 @@ class _Resolver:
     def _side(self, causality: Literal["input", "output"]) -> _Side:
         side = _Side(causality)
         for variable in self._fmu.variables:
-            if variable.causality == causality and variable.type != "Clock" and not self._held(variable):
+            if variable.causality == causality and variable.type not in _LEFT and not self._held(variable):
                 self._variable(side, variable)
         return side
 

@@ -30,7 +30,8 @@ class Plan:
         version: of FMI, 2 or 3.
         interface: ``cs`` or ``me``.
         instances: names of the instances, which all do the same.
-        structural, start: values to set in configuration mode, and before initialisation.
+        structural, start, held: values to set in configuration mode, before initialisation, and in
+            initialisation mode (those of inputs that are not exchanged).
         inputs, outputs: value references of the variables that are exchanged.
         input_size, output_size: number of their values (more than variables where there are arrays).
         variable_step: whether communication steps may differ; else they are all the same number.
@@ -53,6 +54,7 @@ class Plan:
     instances: tuple[str, ...]
     structural: tuple[Setting, ...]
     start: tuple[Setting, ...]
+    held: tuple[Setting, ...]
     inputs: tuple[int, ...]
     outputs: tuple[int, ...]
     input_size: int
@@ -76,7 +78,7 @@ class Plan:
     def from_json(cls, text: bytes) -> Plan:
         """Return the plan that ``to_json`` wrote."""
         data = json.loads(text)
-        for key in ("structural", "start"):
+        for key in ("structural", "start", "held"):
             data[key] = tuple(Setting(**{**entry, "values": tuple(entry["values"])}) for entry in data[key])
         for key in ("instances", "inputs", "outputs", "log_categories"):
             data[key] = tuple(data[key])

@@ -60,10 +60,7 @@ class Runner:
         inputs again where the time is the same; with an FMU that steps more rarely the outputs are held.
         """
         if self._mode is Mode.INSTANTIATED:
-            self._now = self._start = time_ns
-            for binding in self._bindings:
-                binding.enter_initialisation(time_ns / 1e9)
-            self._mode = Mode.INITIALISATION
+            self._initialise(time_ns)
         elif time_ns == self._now:
             pass
         elif time_ns > self._now:
@@ -74,6 +71,14 @@ class Runner:
         for binding, stepper in zip(self._bindings, self._steppers, strict=True):
             stepper.reread(time_ns / 1e9)
             binding.get_outputs()
+
+    def _initialise(self, time_ns: int) -> None:
+        """Enter initialisation mode, and set the inputs that are not exchanged."""
+        self._now = self._start = time_ns
+        for binding in self._bindings:
+            binding.enter_initialisation(time_ns / 1e9)
+            binding.set(self._plan.held)
+        self._mode = Mode.INITIALISATION
 
     def _advance(self, time_ns: int) -> None:
         """Step every instance to the time, in steps of its own size."""
@@ -147,9 +152,7 @@ class Runner:
         held = len(self._memory) - outputs_at
         memories, states = self._split(blob[_HEAD.size + held :])
         if self._mode is Mode.INSTANTIATED:
-            for binding in self._bindings:
-                binding.enter_initialisation(start / 1e9)
-            self._mode = Mode.INITIALISATION
+            self._initialise(start)
         self._begin()
         for i, binding in enumerate(self._bindings):
             self._put(binding, i, states[i])
