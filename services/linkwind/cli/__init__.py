@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from linkwind.cli import fmu, logs, report, run, scenario, services
+from linkwind.cli import fmu, logs, report, run, scenario, services, verify
 from linkwind.errors import LinkwindError
 
 app = typer.Typer(
@@ -22,6 +22,7 @@ services.register(app)
 scenario.register(app)
 report.register(app)
 logs.register(app)
+verify.register(app)
 fmu.register(app)
 
 

@@ -43,6 +43,15 @@ def load_with(
     return scenario.model_copy(update={"providers": tuple(providers)}), files, tables
 
 
+def files_by_provider(scenario: Scenario, given: Sequence[str]) -> dict[str, Path]:
+    """Return the files of the options by provider.
+
+    Raises:
+        InputError: it is not clear which provider a file is for.
+    """
+    return dict(_named(scenario, text) for text in given)
+
+
 def _named(scenario: Scenario, text: str) -> tuple[str, Path]:
     """Return provider and file of one option."""
     from linkwind.errors import InputError

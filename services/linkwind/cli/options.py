@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 ScenarioArgument = Annotated[str, typer.Argument(help="A built-in scenario's name, or a TOML file.")]
+LogArgument = Annotated[Path, typer.Argument(help="The MCAP log of a run.")]
 OutOption = Annotated[
     Path | None, typer.Option("--out", help="Folder for the results; a new one under runs/ if not given.")
 ]
