@@ -180,10 +180,15 @@ static int is_int32(double value) {
 }
 
 static int is_mode(double value, int kind) {
-    static const unsigned modes[] = {LW_INSTANTIATED, LW_INITIALIZATION, LW_TERMINATED};
-    for (size_t i = 0; i < sizeof modes / sizeof modes[0]; ++i)
-        if (value == modes[i]) return 1;
-    return kind == LW_CO_SIMULATION ? value == LW_STEP : value == LW_EVENT || value == LW_CONTINUOUS;
+    switch (is_int32(value) ? (int32_t)value : 0) {
+    case LW_INSTANTIATED:
+    case LW_INITIALIZATION:
+    case LW_TERMINATED: return 1;
+    case LW_STEP: return kind == LW_CO_SIMULATION;
+    case LW_EVENT:
+    case LW_CONTINUOUS: return kind == LW_MODEL_EXCHANGE;
+    default: return 0;
+    }
 }
 
 static const char *flaw_of_data(const lw_instance *instance, const double *data) {

@@ -21,10 +21,27 @@ C = ROOT / "fmu"
 OK, WARNING, DISCARD, ERROR = range(4)
 TOKEN = "{8c4e810f-3df3-4a00-8276-176fa3c9f000}"
 
-KNOWN = {"MASS", "INERTIA", "PARENT_POINT", "CHILD_POINT", "GRAVITY", "STIFFNESS", "DAMPING", "REST", "RTOL",
-         "ATOL", "FORCE", "TORQUE", "ADDED_INERTIA", "Q", "V"}  # fmt: skip
-INPUTS = {"dynamics": {"FORCE", "TORQUE", "ADDED_INERTIA"},
-          "aero": {"POSITION", "ORIENTATION", "LINEAR", "ANGULAR"}}  # fmt: skip
+KNOWN = {
+    "MASS",
+    "INERTIA",
+    "PARENT_POINT",
+    "CHILD_POINT",
+    "GRAVITY",
+    "STIFFNESS",
+    "DAMPING",
+    "REST",
+    "RTOL",
+    "ATOL",
+    "FORCE",
+    "TORQUE",
+    "ADDED_INERTIA",
+    "Q",
+    "V",
+}
+INPUTS = {
+    "dynamics": {"FORCE", "TORQUE", "ADDED_INERTIA"},
+    "aero": {"POSITION", "ORIENTATION", "LINEAR", "ANGULAR"},
+}
 FIXED = {"PARENT_POINT", "CHILD_POINT"}
 
 
@@ -85,12 +102,35 @@ def _model(part, sections, start, calculated, integers, constants, scalar, token
 def dynamics(tables: Tables, q0, v0, *, integrator=2, substeps=1, scalar=False, token=TOKEN) -> Model:
     """Return the FMU of a mechanism."""
     n, nq, nv = len(tables.parent), len(q0), len(v0)
-    sections = {"MASS": n, "INERTIA": 6 * n, "PARENT_POINT": 3 * n, "CHILD_POINT": 3 * n, "GRAVITY": 3,
-                "STIFFNESS": nv, "DAMPING": nv, "REST": nq, "RTOL": 1, "ATOL": 1, "FORCE": 3 * n, "TORQUE": 3 * n,
-                "ADDED_INERTIA": 36 * n, "Q": nq, "V": nv, "DER_Q": nq, "DER_V": nv, "POSITION": 3 * n,
-                "ORIENTATION": 4 * n, "LINEAR": 3 * n, "ANGULAR": 3 * n, "LINEAR_ACCELERATION": 3 * n,
-                "ANGULAR_ACCELERATION": 3 * n, "REACTION_FORCE": 3 * n, "REACTION_TORQUE": 3 * n,
-                "KINETIC_ENERGY": 1, "POTENTIAL_ENERGY": 1}  # fmt: skip
+    sections = {
+        "MASS": n,
+        "INERTIA": 6 * n,
+        "PARENT_POINT": 3 * n,
+        "CHILD_POINT": 3 * n,
+        "GRAVITY": 3,
+        "STIFFNESS": nv,
+        "DAMPING": nv,
+        "REST": nq,
+        "RTOL": 1,
+        "ATOL": 1,
+        "FORCE": 3 * n,
+        "TORQUE": 3 * n,
+        "ADDED_INERTIA": 36 * n,
+        "Q": nq,
+        "V": nv,
+        "DER_Q": nq,
+        "DER_V": nv,
+        "POSITION": 3 * n,
+        "ORIENTATION": 4 * n,
+        "LINEAR": 3 * n,
+        "ANGULAR": 3 * n,
+        "LINEAR_ACCELERATION": 3 * n,
+        "ANGULAR_ACCELERATION": 3 * n,
+        "REACTION_FORCE": 3 * n,
+        "REACTION_TORQUE": 3 * n,
+        "KINETIC_ENERGY": 1,
+        "POTENTIAL_ENERGY": 1,
+    }
     start = {name: getattr(tables, name.lower()) for name in sections if hasattr(tables, name.lower())}
     start |= {"RTOL": 1e-6, "ATOL": 1e-9, "Q": q0, "V": v0}
     constants = f"const int32_t lw_fmu_n = {n}, lw_fmu_nq = {nq}, lw_fmu_nv = {nv};\n"
@@ -106,8 +146,19 @@ def aero(table: PlateTable | FieldTable, theta=(), *, scalar=False) -> Model:
     """Return the FMU of a force model."""
     n = len(table.body)
     plate = isinstance(table, PlateTable)
-    sections = {"DENSITY": 1, "WIND": 3, "LENGTH": n, "SPAN": n, "POSITION": 3 * n, "ORIENTATION": 4 * n,
-                "LINEAR": 3 * n, "ANGULAR": 3 * n, "FORCE": 3 * n, "TORQUE": 3 * n, "ADDED_INERTIA": 36 * n}  # fmt: skip
+    sections = {
+        "DENSITY": 1,
+        "WIND": 3,
+        "LENGTH": n,
+        "SPAN": n,
+        "POSITION": 3 * n,
+        "ORIENTATION": 4 * n,
+        "LINEAR": 3 * n,
+        "ANGULAR": 3 * n,
+        "FORCE": 3 * n,
+        "TORQUE": 3 * n,
+        "ADDED_INERTIA": 36 * n,
+    }
     start = {"ORIENTATION": np.tile([1.0, 0.0, 0.0, 0.0], n)}
     gusts, field, coefficients = np.zeros((0, 8)), [[0], [0], [0.0]], 0
     if plate:
@@ -117,7 +168,9 @@ def aero(table: PlateTable | FieldTable, theta=(), *, scalar=False) -> Model:
     else:
         field = [table.start, table.code, table.constants]
     constants = f"const int32_t lw_fmu_n = {n}, lw_fmu_nq = 0, lw_fmu_nv = 0;\n"
-    constants += f"const int32_t lw_fmu_aero_model = {int(not plate)}, lw_fmu_coefficients = {coefficients};\n"
+    constants += (
+        f"const int32_t lw_fmu_aero_model = {int(not plate)}, lw_fmu_coefficients = {coefficients};\n"
+    )
     constants += f"const int32_t lw_fmu_gust_count = {len(gusts)};\n" + _array("double", "gusts", gusts)
     constants += _array("int32_t", "field_start", field[0]) + _array("int32_t", "field_code", field[1])
     constants += _array("double", "field_constants", field[2])
@@ -163,7 +216,9 @@ class Compiler:
         return out
 
     def _run(self, arguments: list[str]) -> None:
-        done = subprocess.run([*build_hook().compiler(), *arguments], capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            [*build_hook().compiler(), *arguments], capture_output=True, text=True, check=False
+        )
         assert done.returncode == 0, done.stderr
 
     def _link(self, model: Model, version: int, name: str, more: list[Path], mode: list[str]) -> Path:
@@ -190,9 +245,13 @@ class Compiler:
 
 Logger3 = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
 Update3 = ctypes.CFUNCTYPE(
-    None, ctypes.c_void_p, ctypes.c_double, *[ctypes.c_bool] * 4, ctypes.POINTER(ctypes.c_bool),
+    None,
+    ctypes.c_void_p,
+    ctypes.c_double,
+    *[ctypes.c_bool] * 4,
+    ctypes.POINTER(ctypes.c_bool),
     ctypes.POINTER(ctypes.c_double),
-)  # fmt: skip
+)
 
 
 def pointer(array: np.ndarray) -> ctypes.c_void_p:
@@ -202,11 +261,25 @@ def pointer(array: np.ndarray) -> ctypes.c_void_p:
 class Instance:
     """One instance through FMI 3; every call returns its status, messages are collected."""
 
-    def __init__(self, library: Path, model: Model, *, exchange=False, token=TOKEN, update=None, early=False,
-                 logging=True) -> None:  # fmt: skip
+    def __init__(
+        self,
+        library: Path,
+        model: Model,
+        *,
+        exchange=False,
+        token=TOKEN,
+        update=None,
+        early=False,
+        logging=True,
+    ) -> None:
         self.library, self.model, self.messages = ctypes.CDLL(str(library)), model, []
-        self._keep = [Logger3(lambda _e, status, category, text: self.messages.append(
-            (status, (category or b"").decode(), text.decode())))]  # fmt: skip
+        self._keep = [
+            Logger3(
+                lambda _e, status, category, text: self.messages.append(
+                    (status, (category or b"").decode(), text.decode())
+                )
+            )
+        ]
         name, logger = b"instance", self._keep[0] if logging else None
         if exchange:
             function = self.library.fmi3InstantiateModelExchange
@@ -216,8 +289,11 @@ class Instance:
             self._keep.append(Update3(update) if update else None)
             tail = [None, 0, None, logger, self._keep[1]]
             arguments = [name, token.encode(), None, False, logging, False, early, *tail]
-            function.argtypes = [ctypes.c_char_p] * 3 + [ctypes.c_bool] * 4 + [
-                ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]  # fmt: skip
+            function.argtypes = (
+                [ctypes.c_char_p] * 3
+                + [ctypes.c_bool] * 4
+                + [ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]
+            )
         function.restype = ctypes.c_void_p
         self.at = ctypes.c_void_p(function(*arguments))
 
@@ -229,8 +305,14 @@ class Instance:
         assert status == OK, (name, status, self.messages[-1:])
 
     def initialize(self, time=0.0, stop=None) -> Instance:
-        self.do("EnterInitializationMode", False, ctypes.c_double(0.0), ctypes.c_double(time), stop is not None,
-                ctypes.c_double(stop or 0.0))  # fmt: skip
+        self.do(
+            "EnterInitializationMode",
+            False,
+            ctypes.c_double(0.0),
+            ctypes.c_double(time),
+            stop is not None,
+            ctypes.c_double(stop or 0.0),
+        )
         self.do("ExitInitializationMode")
         return self
 
@@ -242,7 +324,13 @@ class Instance:
 
     def get(self, *sections: str) -> np.ndarray:
         vrs, values = self.vrs(*sections), np.full(self.size(*sections), math.nan)
-        self.do("GetFloat64", pointer(vrs), ctypes.c_size_t(len(vrs)), pointer(values), ctypes.c_size_t(values.size))
+        self.do(
+            "GetFloat64",
+            pointer(vrs),
+            ctypes.c_size_t(len(vrs)),
+            pointer(values),
+            ctypes.c_size_t(values.size),
+        )
         return values
 
     def get_time(self) -> float:
@@ -252,8 +340,9 @@ class Instance:
 
     def try_set(self, section: str, values) -> int:
         vrs, data = self.vrs(section), np.ascontiguousarray(np.ravel(values), dtype=float)
-        return self.call("SetFloat64", pointer(vrs), ctypes.c_size_t(len(vrs)), pointer(data),
-                         ctypes.c_size_t(data.size))  # fmt: skip
+        return self.call(
+            "SetFloat64", pointer(vrs), ctypes.c_size_t(len(vrs)), pointer(data), ctypes.c_size_t(data.size)
+        )
 
     def set(self, section: str, values) -> None:
         assert self.try_set(section, values) == OK, self.messages[-1:]
@@ -265,7 +354,9 @@ class Instance:
     def try_step(self, point: float, size: float) -> tuple[int, bool, float]:
         flags_, last = (ctypes.c_bool * 3)(), ctypes.c_double()
         at = [ctypes.byref(flags_, k) for k in range(3)]
-        status = self.call("DoStep", ctypes.c_double(point), ctypes.c_double(size), True, *at, ctypes.byref(last))
+        status = self.call(
+            "DoStep", ctypes.c_double(point), ctypes.c_double(size), True, *at, ctypes.byref(last)
+        )
         return status, flags_[2], last.value
 
     def step(self, point: float, size: float) -> None:
@@ -286,15 +377,26 @@ class Instance:
 
     def deserialize(self, data: bytes) -> tuple[int, ctypes.c_void_p]:
         handle = ctypes.c_void_p()
-        return self.call("DeserializeFMUState", data, ctypes.c_size_t(len(data)), ctypes.byref(handle)), handle
+        return self.call(
+            "DeserializeFMUState", data, ctypes.c_size_t(len(data)), ctypes.byref(handle)
+        ), handle
 
     def derivative(self, kind: str, unknowns, knowns, seed) -> np.ndarray:
         of, by = self.vrs(*unknowns), self.vrs(*knowns)
         seed = np.ascontiguousarray(seed, dtype=float)
         out = np.full(self.size(*(unknowns if kind == "Directional" else knowns)), math.nan)
         size = ctypes.c_size_t
-        self.do(f"Get{kind}Derivative", pointer(of), size(len(of)), pointer(by), size(len(by)), pointer(seed),
-                size(seed.size), pointer(out), size(out.size))  # fmt: skip
+        self.do(
+            f"Get{kind}Derivative",
+            pointer(of),
+            size(len(of)),
+            pointer(by),
+            size(len(by)),
+            pointer(seed),
+            size(seed.size),
+            pointer(out),
+            size(out.size),
+        )
         return out
 
     def free(self) -> None:

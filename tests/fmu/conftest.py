@@ -21,19 +21,44 @@ def spatial_mechanism():
     """Return tables and start of a tree with every joint type but fixed."""
     bodies = [
         Body(-1, "free", 2.0, np.diag([0.3, 0.5, 0.6]), child_point=(0.1, 0.0, 0.0)),
-        Body(0, "spherical", 1.0, np.diag([0.1, 0.12, 0.2]), (0.3, 0.1, 0.0), (-0.2, 0.0, 0.05),
-             stiffness=3.0, damping=0.1),
-        Body(1, "revolute", 0.7, np.diag([0.05, 0.04, 0.06]), (0.2, 0.0, 0.0), (-0.2, 0.0, 0.0),
-             parent_rotation=tilted(0.3, 0.4, 0.0), child_rotation=tilted(0.3, 0.4, 0.0), stiffness=2.0),
-        Body(0, "prismatic", 0.5, np.diag([0.02, 0.03, 0.02]), (0.0, 0.2, 0.0), parent_rotation=tilted(0.8, 0.0, 0.0),
-             stiffness=5.0, damping=0.2),
+        Body(
+            0,
+            "spherical",
+            1.0,
+            np.diag([0.1, 0.12, 0.2]),
+            (0.3, 0.1, 0.0),
+            (-0.2, 0.0, 0.05),
+            stiffness=3.0,
+            damping=0.1,
+        ),
+        Body(
+            1,
+            "revolute",
+            0.7,
+            np.diag([0.05, 0.04, 0.06]),
+            (0.2, 0.0, 0.0),
+            (-0.2, 0.0, 0.0),
+            parent_rotation=tilted(0.3, 0.4, 0.0),
+            child_rotation=tilted(0.3, 0.4, 0.0),
+            stiffness=2.0,
+        ),
+        Body(
+            0,
+            "prismatic",
+            0.5,
+            np.diag([0.02, 0.03, 0.02]),
+            (0.0, 0.2, 0.0),
+            parent_rotation=tilted(0.8, 0.0, 0.0),
+            stiffness=5.0,
+            damping=0.2,
+        ),
         Body(-1, "planar", 1.2, np.diag([0.1, 0.1, 0.1]), child_point=(0.05, 0.0, 0.0)),
-    ]  # fmt: skip
+    ]
     found = tables(bodies, gravity=(0.3, -9.81, 0.5))
     random = np.random.default_rng(3)
-    q = np.concatenate([
-        random.normal(size=3), [0.8, 0.0, 0.6, 0.0], [0.96, 0.28, 0.0, 0.0], random.normal(size=1 + 1 + 3)
-    ])  # fmt: skip
+    q = np.concatenate(
+        [random.normal(size=3), [0.8, 0.0, 0.6, 0.0], [0.96, 0.28, 0.0, 0.0], random.normal(size=1 + 1 + 3)]
+    )
     return found, q, random.normal(size=len(found.stiffness))
 
 

@@ -57,7 +57,9 @@ def set_motion(fmu: Instance, motion: Motion) -> None:
 
 @pytest.fixture(scope="module")
 def plate(compiler):
-    scenario = load("two_link", ["environment.gusts=[{amplitude=[0.5,0.2,0],frequency=2,wavenumber=[0.3,0,0]}]"])
+    scenario = load(
+        "two_link", ["environment.gusts=[{amplitude=[0.5,0.2,0],frequency=2,wavenumber=[0.3,0,0]}]"]
+    )
     table = plate_table(scenario, scenario.providers[0])
     model = aero(table)
     return table, model, compiler.library(model, 3, "plate")
@@ -66,14 +68,21 @@ def plate(compiler):
 @pytest.fixture(scope="module")
 def field(compiler):
     scenario = loads(FIELD, "field")
-    table, theta = field_table(scenario, scenario.providers[0]), initial_angles(scenario, scenario.providers[0])
+    table, theta = (
+        field_table(scenario, scenario.providers[0]),
+        initial_angles(scenario, scenario.providers[0]),
+    )
     model = aero(table, theta)
     return table, theta, model, compiler.library(model, 3, "field")
 
 
 def test_plate_bit_for_bit(plate):
     table, model, library = plate
-    fmu, native, wrench = Instance(library, model).initialize(), Plates(table), Wrench.zeros(2, added_inertia=True)
+    fmu, native, wrench = (
+        Instance(library, model).initialize(),
+        Plates(table),
+        Wrench.zeros(2, added_inertia=True),
+    )
     for k, motion in enumerate(motions(2, 50)):
         set_motion(fmu, motion)
         native.evaluate(fmu.get_time(), motion, wrench)
@@ -147,7 +156,9 @@ def test_field_that_is_not_finite(field):
 
     from tests.fmu.c_model import pointer
 
-    assert fmu.call("GetFloat64", pointer(vrs), ctypes.c_size_t(1), pointer(out), ctypes.c_size_t(6)) == DISCARD
+    assert (
+        fmu.call("GetFloat64", pointer(vrs), ctypes.c_size_t(1), pointer(out), ctypes.c_size_t(6)) == DISCARD
+    )
     assert "finite wrench on body 0" in fmu.messages[-1][2]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,8 +14,20 @@ from tests.fmu.c_model import OK, Instance, pointer
 from tests.fmu.conftest import spatial_mechanism
 from tests.fmu.test_c_trajectory import added
 
-OUTPUTS = ["DER_Q", "DER_V", "POSITION", "ORIENTATION", "LINEAR", "ANGULAR", "LINEAR_ACCELERATION",
-           "ANGULAR_ACCELERATION", "REACTION_FORCE", "REACTION_TORQUE", "KINETIC_ENERGY", "POTENTIAL_ENERGY"]  # fmt: skip
+OUTPUTS = [
+    "DER_Q",
+    "DER_V",
+    "POSITION",
+    "ORIENTATION",
+    "LINEAR",
+    "ANGULAR",
+    "LINEAR_ACCELERATION",
+    "ANGULAR_ACCELERATION",
+    "REACTION_FORCE",
+    "REACTION_TORQUE",
+    "KINETIC_ENERGY",
+    "POTENTIAL_ENERGY",
+]
 TOLERANCE = 1e-7
 
 
@@ -37,7 +50,9 @@ def evaluate(core: Multibody, values: dict[str, np.ndarray]) -> np.ndarray:
     """Outputs from the known values, through the binding of the core."""
     state = np.concatenate([values["Q"], values["V"], [0.0]])
     wrench = np.hstack([values["FORCE"].reshape(-1, 3), values["TORQUE"].reshape(-1, 3)])
-    found = core.evaluate(state, np.ascontiguousarray(wrench), values["ADDED_INERTIA"].reshape(-1, 6, 6).copy())
+    found = core.evaluate(
+        state, np.ascontiguousarray(wrench), values["ADDED_INERTIA"].reshape(-1, 6, 6).copy()
+    )
     motion = Motion.at_rest(core.n)
     core.motion(state, motion)
     rates = (motion.position, motion.orientation, motion.linear, motion.angular)
@@ -47,13 +62,15 @@ def evaluate(core: Multibody, values: dict[str, np.ndarray]) -> np.ndarray:
 
 
 def extrapolated(function, step: float) -> np.ndarray:
-    """Derivative at 0 by Richardson's extrapolation of central differences, independent of the FMU's formula."""
+    """Derivative at 0 by Richardson's extrapolation of central differences: not the FMU's formula."""
     table = [(function(h) - function(-h)) / (2 * h) for h in (step, step / 2, step / 4)]
-    first = [(4 * b - a) / 3 for a, b in zip(table, table[1:], strict=False)]
+    first = [(4 * b - a) / 3 for a, b in pairwise(table)]
     return (16 * first[1] - first[0]) / 15
 
 
-@pytest.mark.parametrize("knowns", [["FORCE", "TORQUE"], ["Q"], ["V"], ["ADDED_INERTIA"], ["Q", "V", "FORCE"]])
+@pytest.mark.parametrize(
+    "knowns", [["FORCE", "TORQUE"], ["Q"], ["V"], ["ADDED_INERTIA"], ["Q", "V", "FORCE"]]
+)
 def test_directional_adjoint_and_differences_agree(fmu, core, knowns):
     random = np.random.default_rng(sum(map(len, knowns)))
     names = ["FORCE", "TORQUE", "ADDED_INERTIA", "Q", "V"]
@@ -90,7 +107,9 @@ def test_forces_exactly(fmu, core):
         np.testing.assert_allclose(found, exact, rtol=1e-10, atol=1e-11)
 
 
-@pytest.mark.parametrize("parameter", ["MASS", "INERTIA", "GRAVITY", "STIFFNESS", "DAMPING", "REST", "CHILD_POINT"])
+@pytest.mark.parametrize(
+    "parameter", ["MASS", "INERTIA", "GRAVITY", "STIFFNESS", "DAMPING", "REST", "CHILD_POINT"]
+)
 def test_parameters(fmu, spatial_library, spatial_model, parameter):
     """Against differences of instances that were started with other parameters."""
     seed = np.random.default_rng(4).normal(size=fmu.size(parameter))
@@ -116,7 +135,9 @@ def test_nothing_is_left_behind(fmu, spatial_library, spatial_model):
     for name in ("FORCE", "TORQUE", "ADDED_INERTIA"):
         twin.set(name, fmu.get(name))
     for k in range(20):
-        fmu.derivative("Directional", ["DER_V", "POSITION"], ["Q", "MASS"], np.arange(1.0, fmu.size("Q", "MASS") + 1))
+        fmu.derivative(
+            "Directional", ["DER_V", "POSITION"], ["Q", "MASS"], np.arange(1.0, fmu.size("Q", "MASS") + 1)
+        )
         fmu.derivative("Adjoint", ["REACTION_FORCE"], ["V", "STIFFNESS"], np.ones(15))
         for one in (fmu, twin):
             one.step(k * 0.01, 0.01)
@@ -137,8 +158,14 @@ def test_output_derivatives_along_the_motion(fmu, spatial_library, spatial_model
     outputs = [*OUTPUTS, "Q", "V"]
     vrs = fmu.vrs(*outputs)
     orders, found = np.ones(len(vrs), dtype=np.int32), np.zeros(fmu.size(*outputs))
-    fmu.do("GetOutputDerivatives", pointer(vrs), ctypes.c_size_t(len(vrs)), pointer(orders), pointer(found),
-           ctypes.c_size_t(found.size))  # fmt: skip
+    fmu.do(
+        "GetOutputDerivatives",
+        pointer(vrs),
+        ctypes.c_size_t(len(vrs)),
+        pointer(orders),
+        pointer(found),
+        ctypes.c_size_t(found.size),
+    )
 
     def after(h: float) -> np.ndarray:
         other = Instance(spatial_library, spatial_model).initialize()
@@ -152,5 +179,14 @@ def test_output_derivatives_along_the_motion(fmu, spatial_library, spatial_model
     expected = (-11 * after(0.0) + 18 * after(h) - 9 * after(2 * h) + 2 * after(3 * h)) / (6 * h)
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
     for order in (0, 2):
-        assert fmu.call("GetOutputDerivatives", pointer(vrs), ctypes.c_size_t(len(vrs)), pointer(order * orders),
-                        pointer(found), ctypes.c_size_t(found.size)) != OK  # fmt: skip
+        assert (
+            fmu.call(
+                "GetOutputDerivatives",
+                pointer(vrs),
+                ctypes.c_size_t(len(vrs)),
+                pointer(order * orders),
+                pointer(found),
+                ctypes.c_size_t(found.size),
+            )
+            != OK
+        )

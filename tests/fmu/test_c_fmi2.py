@@ -18,15 +18,21 @@ Logger2 = ctypes.CFUNCTYPE(
 
 
 class Callbacks(ctypes.Structure):
-    _fields_ = [("logger", ctypes.c_void_p), *[(name, ctypes.c_void_p) for name in ("a", "f", "s")],
-                ("environment", ctypes.c_void_p)]  # fmt: skip
+    _fields_ = [
+        ("logger", ctypes.c_void_p),
+        *[(name, ctypes.c_void_p) for name in ("a", "f", "s")],
+        ("environment", ctypes.c_void_p),
+    ]
 
 
 class Instance2:
     def __init__(self, library, model, *, exchange=False) -> None:
         self.library, self.model, self.messages = ctypes.CDLL(str(library)), model, []
-        self._logger = Logger2(lambda _e, _n, status, category, text: self.messages.append(
-            (status, category.decode(), text.decode())))  # fmt: skip
+        self._logger = Logger2(
+            lambda _e, _n, status, category, text: self.messages.append(
+                (status, category.decode(), text.decode())
+            )
+        )
         self._callbacks = Callbacks(ctypes.cast(self._logger, ctypes.c_void_p))
         instantiate = self.library.fmi2Instantiate
         instantiate.restype = ctypes.c_void_p
@@ -65,8 +71,13 @@ class Instance2:
     def set_derivative(self, section, order: int, values) -> int:
         vrs, values = self.vrs(section), np.ascontiguousarray(np.ravel(values), float)
         orders = np.full(len(vrs), order, dtype=np.int32)
-        return self.call("SetRealInputDerivatives", pointer(vrs), ctypes.c_size_t(len(vrs)), pointer(orders),
-                         pointer(values))  # fmt: skip
+        return self.call(
+            "SetRealInputDerivatives",
+            pointer(vrs),
+            ctypes.c_size_t(len(vrs)),
+            pointer(orders),
+            pointer(values),
+        )
 
     def step(self, point, size) -> int:
         return self.call("DoStep", ctypes.c_double(point), ctypes.c_double(size), True)
@@ -127,8 +138,12 @@ def test_input_derivatives_belong_to_the_state(fmu):
 def test_wrong_input_derivatives(fmu):
     assert fmu.set_derivative("ADDED_INERTIA", 1, np.ones(72)) == WARNING
     assert "held" in fmu.messages[-1][2]
-    for section, order, values in (("MASS", 1, [1.0, 1.0]), ("FORCE", 0, np.ones(6)), ("FORCE", 4, np.ones(6)),
-                                   ("FORCE", 1, np.full(6, np.nan))):  # fmt: skip
+    for section, order, values in (
+        ("MASS", 1, [1.0, 1.0]),
+        ("FORCE", 0, np.ones(6)),
+        ("FORCE", 4, np.ones(6)),
+        ("FORCE", 1, np.full(6, np.nan)),
+    ):
         assert fmu.set_derivative(section, order, values) == ERROR
         assert section in fmu.messages[-1][2]
 
@@ -140,7 +155,10 @@ def test_output_derivatives(fmu):
     fmu.do("GetRealOutputDerivatives", pointer(vrs), size, pointer(orders), pointer(values))
     assert values.tobytes() == fmu.get("LINEAR", "ANGULAR_ACCELERATION").tobytes()
     for order in (0, 2):
-        assert fmu.call("GetRealOutputDerivatives", pointer(vrs), size, pointer(order * orders), pointer(values)) == ERROR
+        assert (
+            fmu.call("GetRealOutputDerivatives", pointer(vrs), size, pointer(order * orders), pointer(values))
+            == ERROR
+        )
 
 
 def test_status_of_the_last_step(fmu):

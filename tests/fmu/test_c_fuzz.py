@@ -16,7 +16,10 @@ from tests.fmu.test_c_aero import FIELD
 
 HERE = Path(__file__).parent
 SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer", "-g")
-ENVIRONMENT = os.environ | {"ASAN_OPTIONS": "detect_leaks=1:abort_on_error=0", "UBSAN_OPTIONS": "print_stacktrace=1"}
+ENVIRONMENT = os.environ | {
+    "ASAN_OPTIONS": "detect_leaks=1:abort_on_error=0",
+    "UBSAN_OPTIONS": "print_stacktrace=1",
+}
 CALLS = {3: "8000", 2: "30000"}
 
 
@@ -24,7 +27,9 @@ CALLS = {3: "8000", 2: "30000"}
 def sanitized(tmp_path_factory):
     folder = tmp_path_factory.mktemp("sanitized")
     wrong = folder / "wrong.c"
-    wrong.write_text("#include <stdlib.h>\nint main(int n, char **a) { (void)a; char *p = malloc(1); return p[n]; }\n")
+    wrong.write_text(
+        "#include <stdlib.h>\nint main(int n, char **a) { (void)a; char *p = malloc(1); return p[n]; }\n"
+    )
     command = [*build_hook().compiler(), *SANITIZERS, str(wrong), "-o", str(folder / "wrong")]
     if subprocess.run(command, capture_output=True, check=False).returncode:
         pytest.skip("the compiler has no sanitizers")
@@ -34,7 +39,9 @@ def sanitized(tmp_path_factory):
 
 
 def run(program: Path, version: int, seed: int) -> dict[str, list[int]]:
-    done = subprocess.run([program, str(seed), CALLS[version]], capture_output=True, text=True, check=False, env=ENVIRONMENT)
+    done = subprocess.run(
+        [program, str(seed), CALLS[version]], capture_output=True, text=True, check=False, env=ENVIRONMENT
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     rows = (line.split() for line in done.stdout.splitlines())
     return {name: [int(count) for count in counts] for name, *counts in rows}
@@ -45,8 +52,11 @@ def models():
     scenario = loads(FIELD, "field")
     provider = scenario.providers[0]
     field = aero(field_table(scenario, provider), initial_angles(scenario, provider))
-    return {"dynamics_3": dynamics(*spatial_mechanism()), "aero_3": field,
-            "dynamics_2": dynamics(*spatial_mechanism(), scalar=True)}  # fmt: skip
+    return {
+        "dynamics_3": dynamics(*spatial_mechanism()),
+        "aero_3": field,
+        "dynamics_2": dynamics(*spatial_mechanism(), scalar=True),
+    }
 
 
 @pytest.mark.parametrize("name", ["dynamics_3", "aero_3", "dynamics_2"])

@@ -62,15 +62,32 @@ def test_communication_points(running):
 
 def test_value_references_and_counts(running):
     values = np.zeros(6)
-    for references, count, word in (([9999], 1, "below"), ([2**32 - 1], 1, "below"), (running.vrs("FORCE"), 5, "= 6 but")):
+    for references, count, word in (
+        ([9999], 1, "below"),
+        ([2**32 - 1], 1, "below"),
+        (running.vrs("FORCE"), 5, "= 6 but"),
+    ):
         vrs = np.array(references, dtype=np.uint32)
         for call in ("GetFloat64", "SetFloat64"):
-            refused(running, running.call(call, pointer(vrs), size(len(vrs)), pointer(values), size(count)), word)
+            refused(
+                running, running.call(call, pointer(vrs), size(len(vrs)), pointer(values), size(count)), word
+            )
     solver = running.vrs("SUBSTEPS")
-    refused(running, running.call("GetFloat64", pointer(solver), size(1), pointer(values), size(1)), "SUBSTEPS", "Float64")
+    refused(
+        running,
+        running.call("GetFloat64", pointer(solver), size(1), pointer(values), size(1)),
+        "SUBSTEPS",
+        "Float64",
+    )
     force = running.vrs("FORCE")
-    refused(running, running.call("GetInt32", pointer(force), size(1), pointer(values), size(1)), "FORCE", "Int32")
-    refused(running, running.call("GetFloat64", None, size(1), pointer(values), size(1)), "pointer in valueReferences")
+    refused(
+        running, running.call("GetInt32", pointer(force), size(1), pointer(values), size(1)), "FORCE", "Int32"
+    )
+    refused(
+        running,
+        running.call("GetFloat64", None, size(1), pointer(values), size(1)),
+        "pointer in valueReferences",
+    )
     refused(running, running.call("GetFloat64", pointer(force), size(1), None, size(6)), "pointer in values")
     running.do("GetFloat64", None, size(0), None, size(0))
 
@@ -92,10 +109,17 @@ def test_what_may_be_set_when(fmu):
 
 @pytest.mark.parametrize(
     ("section", "values", "words"),
-    [("MASS", [1.0, -2.0], ("MASS", "mass of zero or more but was -2")),
-     ("INERTIA", [0, 0, 1, 0, 0, 0, 0, 0, -3, 0, 0, 0], ("INERTIA", "moment of inertia of zero or more but was -3")),
-     ("RTOL", [-1.0], ("RTOL", "zero or more")), ("ATOL", [0.0], ("ATOL", "more than zero"))],
-)  # fmt: skip
+    [
+        ("MASS", [1.0, -2.0], ("MASS", "mass of zero or more but was -2")),
+        (
+            "INERTIA",
+            [0, 0, 1, 0, 0, 0, 0, 0, -3, 0, 0, 0],
+            ("INERTIA", "moment of inertia of zero or more but was -3"),
+        ),
+        ("RTOL", [-1.0], ("RTOL", "zero or more")),
+        ("ATOL", [0.0], ("ATOL", "more than zero")),
+    ],
+)
 def test_parameters_without_sense(running, section, values, words):
     before = running.get(section)
     running.set(section, values)
@@ -221,8 +245,17 @@ def test_derivatives_of_the_wrong_kind(running, kind):
     def ask(unknowns, knowns, n_unknowns, n_knowns) -> int:
         of, by = running.vrs(*unknowns), running.vrs(*knowns)
         n_seed, n_out = (n_knowns, n_unknowns) if kind == "Directional" else (n_unknowns, n_knowns)
-        return running.call(f"Get{kind}Derivative", pointer(of), size(len(of)), pointer(by), size(len(by)),
-                            pointer(np.ones(99)), size(n_seed), pointer(np.zeros(99)), size(n_out))  # fmt: skip
+        return running.call(
+            f"Get{kind}Derivative",
+            pointer(of),
+            size(len(of)),
+            pointer(by),
+            size(len(by)),
+            pointer(np.ones(99)),
+            size(n_seed),
+            pointer(np.zeros(99)),
+            size(n_out),
+        )
 
     assert ask(["DER_V"], ["FORCE"], 4, 6) == OK
     refused(running, ask(["DER_V"], ["FORCE"], 4, 5), "6 numbers for the knowns but was 5")
@@ -233,13 +266,29 @@ def test_derivatives_of_the_wrong_kind(running, kind):
 
 def test_what_the_model_does_not_have(running):
     one, values = np.zeros(1, dtype=np.uint32), np.zeros(4)
-    for name in ("Float32", "Int8", "UInt8", "Int16", "UInt16", "UInt32", "Int64", "UInt64", "Boolean", "String"):
+    for name in (
+        "Float32",
+        "Int8",
+        "UInt8",
+        "Int16",
+        "UInt16",
+        "UInt32",
+        "Int64",
+        "UInt64",
+        "Boolean",
+        "String",
+    ):
         for verb in ("Get", "Set"):
             refused(running, running.call(verb + name, pointer(one), size(1), pointer(values), size(1)))
             running.do(verb + name, None, size(0), None, size(0))
     for name in ("GetClock", "SetClock", "GetBinary", "SetBinary", "GetIntervalDecimal", "SetShiftDecimal"):
         refused(running, running.call(name, pointer(one), size(1), pointer(values), pointer(values), size(1)))
-    for name in ("EnterConfigurationMode", "ExitConfigurationMode", "EnterStepMode", "EvaluateDiscreteStates"):
+    for name in (
+        "EnterConfigurationMode",
+        "ExitConfigurationMode",
+        "EnterStepMode",
+        "EvaluateDiscreteStates",
+    ):
         refused(running, running.call(name))
     refused(running, running.call("ActivateModelPartition", 0, number(0.0)))
     refused(running, running.call("GetNumberOfVariableDependencies", 0, pointer(values)))

@@ -131,9 +131,15 @@ def signed(blob: bytes) -> bytes:
 
 @pytest.mark.parametrize(
     ("index", "value", "flaw"),
-    [(0, 0.0, "another interface type"), (1, 3.0, "unknown mode"), (1, 8.0, "unknown mode"), (2, np.nan, "not finite"),
-     (5, 1e10, "broken integers"), (20, np.inf, "not finite")],
-)  # fmt: skip
+    [
+        (0, 0.0, "another interface type"),
+        (1, 3.0, "unknown mode"),
+        (1, 8.0, "unknown mode"),
+        (2, np.nan, "not finite"),
+        (5, 1e10, "broken integers"),
+        (20, np.inf, "not finite"),
+    ],
+)
 def test_nonsense_with_a_good_checksum(fmu, index, value, flaw):
     blob = bytearray(fmu.serialize(fmu.get_state()))
     blob[24 + 8 * index : 32 + 8 * index] = np.float64(value).tobytes()

@@ -12,26 +12,28 @@ import pytest
 from tests.fmu.c_model import Instance, dynamics
 
 VERSION_2 = """
-GetTypesPlatform GetVersion SetDebugLogging Instantiate FreeInstance SetupExperiment EnterInitializationMode
-ExitInitializationMode Terminate Reset GetReal GetInteger GetBoolean GetString SetReal SetInteger SetBoolean
-SetString GetFMUstate SetFMUstate FreeFMUstate SerializedFMUstateSize SerializeFMUstate DeSerializeFMUstate
-GetDirectionalDerivative EnterEventMode NewDiscreteStates EnterContinuousTimeMode CompletedIntegratorStep SetTime
-SetContinuousStates GetDerivatives GetEventIndicators GetContinuousStates GetNominalsOfContinuousStates
-SetRealInputDerivatives GetRealOutputDerivatives DoStep CancelStep GetStatus GetRealStatus GetIntegerStatus
-GetBooleanStatus GetStringStatus
+GetTypesPlatform GetVersion SetDebugLogging Instantiate FreeInstance SetupExperiment
+EnterInitializationMode ExitInitializationMode Terminate Reset GetReal GetInteger GetBoolean GetString
+SetReal SetInteger SetBoolean SetString GetFMUstate SetFMUstate FreeFMUstate SerializedFMUstateSize
+SerializeFMUstate DeSerializeFMUstate GetDirectionalDerivative EnterEventMode NewDiscreteStates
+EnterContinuousTimeMode CompletedIntegratorStep SetTime SetContinuousStates GetDerivatives
+GetEventIndicators GetContinuousStates GetNominalsOfContinuousStates SetRealInputDerivatives
+GetRealOutputDerivatives DoStep CancelStep GetStatus GetRealStatus GetIntegerStatus GetBooleanStatus
+GetStringStatus
 """
 TYPES = "Float32 Float64 Int8 UInt8 Int16 UInt16 Int32 UInt32 Int64 UInt64 Boolean String Binary Clock"
 VERSION_3 = f"""
-GetVersion SetDebugLogging InstantiateModelExchange InstantiateCoSimulation InstantiateScheduledExecution FreeInstance
-EnterInitializationMode ExitInitializationMode EnterEventMode Terminate Reset GetNumberOfVariableDependencies
-{" ".join(f"Get{name} Set{name}" for name in TYPES.split())}
+GetVersion SetDebugLogging InstantiateModelExchange InstantiateCoSimulation InstantiateScheduledExecution
+FreeInstance EnterInitializationMode ExitInitializationMode EnterEventMode Terminate Reset
+GetNumberOfVariableDependencies {" ".join(f"Get{name} Set{name}" for name in TYPES.split())}
 GetVariableDependencies GetFMUState SetFMUState FreeFMUState SerializedFMUStateSize SerializeFMUState
-DeserializeFMUState GetDirectionalDerivative GetAdjointDerivative EnterConfigurationMode ExitConfigurationMode
-GetIntervalDecimal GetIntervalFraction GetShiftDecimal GetShiftFraction SetIntervalDecimal SetIntervalFraction
-SetShiftDecimal SetShiftFraction EvaluateDiscreteStates UpdateDiscreteStates EnterContinuousTimeMode
-CompletedIntegratorStep SetTime SetContinuousStates GetContinuousStateDerivatives GetEventIndicators
-GetContinuousStates GetNominalsOfContinuousStates GetNumberOfEventIndicators GetNumberOfContinuousStates EnterStepMode
-GetOutputDerivatives DoStep ActivateModelPartition
+DeserializeFMUState GetDirectionalDerivative GetAdjointDerivative EnterConfigurationMode
+ExitConfigurationMode GetIntervalDecimal GetIntervalFraction GetShiftDecimal GetShiftFraction
+SetIntervalDecimal SetIntervalFraction SetShiftDecimal SetShiftFraction EvaluateDiscreteStates
+UpdateDiscreteStates EnterContinuousTimeMode CompletedIntegratorStep SetTime SetContinuousStates
+GetContinuousStateDerivatives GetEventIndicators GetContinuousStates GetNominalsOfContinuousStates
+GetNumberOfEventIndicators GetNumberOfContinuousStates EnterStepMode GetOutputDerivatives DoStep
+ActivateModelPartition
 """
 
 
@@ -40,10 +42,14 @@ GetOutputDerivatives DoStep ActivateModelPartition
 def test_exports(compiler, two_link, version, names):
     model = dynamics(two_link.tables, two_link.q0, two_link.v0, scalar=version == 2)
     library = compiler.library(model, version, f"symbols_{version}")
-    listed = subprocess.run(["nm", "-D", "--defined-only", library], capture_output=True, text=True, check=True).stdout
+    listed = subprocess.run(
+        ["nm", "-D", "--defined-only", library], capture_output=True, text=True, check=True
+    ).stdout
     exported = {line.split()[-1] for line in listed.splitlines()}
     assert exported == {f"fmi{version}{name}" for name in names.split()}
-    undefined = subprocess.run(["nm", "-D", "--undefined-only", library], capture_output=True, text=True, check=True)
+    undefined = subprocess.run(
+        ["nm", "-D", "--undefined-only", library], capture_output=True, text=True, check=True
+    )
     needed = {line.split()[-1].split("@")[0] for line in undefined.stdout.splitlines()}
     assert not {name for name in needed if name.startswith("lw_")}
     listed = subprocess.run(["size", "-A", library], capture_output=True, text=True, check=True).stdout

@@ -33,14 +33,21 @@ def set_wrench(fmu: Instance, wrench: np.ndarray) -> None:
 
 @pytest.mark.parametrize(
     ("integrator", "substeps"),
-    [(Integrator.RK4, 1), (Integrator.RK4, 3), (Integrator.EULER, 1), (Integrator.SEMI_IMPLICIT_EULER, 2),
-     (Integrator.DOPRI5, 1)],
-)  # fmt: skip
+    [
+        (Integrator.RK4, 1),
+        (Integrator.RK4, 3),
+        (Integrator.EULER, 1),
+        (Integrator.SEMI_IMPLICIT_EULER, 2),
+        (Integrator.DOPRI5, 1),
+    ],
+)
 @pytest.mark.parametrize("mechanism", ["planar", "spatial"])
 def test_thousand_steps_bit_for_bit(request, two_link, mechanism, integrator, substeps):
     model = request.getfixturevalue(f"{mechanism}_model")
     fmu = Instance(request.getfixturevalue(f"{mechanism}_library"), model)
-    tables, q, v = (two_link.tables, two_link.q0, two_link.v0) if mechanism == "planar" else spatial_mechanism()
+    tables, q, v = (
+        (two_link.tables, two_link.q0, two_link.v0) if mechanism == "planar" else spatial_mechanism()
+    )
     core = Multibody(tables)
     state, motion = core.initial_state(q, v), Motion.at_rest(core.n)
     assert fmu.set_integer("INTEGRATOR", integrator) == fmu.set_integer("SUBSTEPS", substeps) == OK
@@ -53,7 +60,9 @@ def test_thousand_steps_bit_for_bit(request, two_link, mechanism, integrator, su
         wrench = forces(core.n, k)
         set_wrench(fmu, wrench)
         fmu.step(k * H, H)
-        state, _ = core.advance(state, H, NODE, wrench[None].copy(), a, integrator=integrator, substeps=substeps)
+        state, _ = core.advance(
+            state, H, NODE, wrench[None].copy(), a, integrator=integrator, substeps=substeps
+        )
         if k % 100 == 0 or k == 999:
             core.motion(state, motion)
             assert fmu.get("Q", "V").tobytes() == state[:-1].tobytes()
@@ -75,8 +84,10 @@ def test_parameter_changed_between_steps(planar_library, planar_model, two_link)
     mass = np.array([1.5, 0.25])
     fmu.set("MASS", mass)
     fmu.step(H, H)
-    core, heavier = Multibody(two_link.tables), Multibody(type(two_link.tables)(
-        **{**vars(two_link.tables), "mass": mass}))  # fmt: skip
+    core, heavier = (
+        Multibody(two_link.tables),
+        Multibody(type(two_link.tables)(**{**vars(two_link.tables), "mass": mass})),
+    )
     state = core.initial_state(two_link.q0, two_link.v0)
     for one in (core, heavier):
         state, _ = one.advance(state, H, NODE, np.zeros((1, 2, 6)), None, integrator=2)
