@@ -143,20 +143,26 @@ static int discard(const lw_instance *instance, int status, const lw_fault *faul
 
 /* ---- inputs ---- */
 
-/* Force and torque `dt` [s] into the step, as the core takes them: (n, 6). */
-static void pack_wrench(const lw_instance *instance, double dt, double *wrench) {
-    const double *value = AT(FORCE), *rate = instance->store + RATES;
+/* An input `dt` [s] into the step: its Taylor polynomial; `i` counts from the first force. */
+static double input_at(const lw_instance *instance, size_t i, double dt) {
+    const double *rate = instance->store + RATES + i;
     int order = (int)instance->store[ORDER];
-    size_t size = forces();
-    for (size_t i = 0; i < size; ++i) {
-        size_t half = i % (size / 2), at = half / 3 * 6 + half % 3 + (i < size / 2 ? 0 : 3);
-        wrench[at] = value[i];
-        double factor = 1.0;
-        for (int k = 1; k <= order; ++k) {
-            factor *= dt / k;
-            wrench[at] += factor * rate[(size_t)(k - 1) * size + i];
-        }
+    double value = AT(FORCE)[i], factor = 1.0;
+    for (int k = 1; k <= order; ++k, rate += forces()) {
+        factor *= dt / k;
+        value += factor * *rate;
     }
+    return value;
+}
+
+/* Forces and torques as the core takes them: (n, 6). */
+static void pack_wrench(const lw_instance *instance, double dt, double *wrench) {
+    size_t torque = 3 * (size_t)lw_fmu_n;
+    for (size_t i = 0; i < torque; i += 3, wrench += 6)
+        for (size_t axis = 0; axis < 3; ++axis) {
+            wrench[axis] = input_at(instance, i + axis, dt);
+            wrench[3 + axis] = input_at(instance, torque + i + axis, dt);
+        }
 }
 
 /* Where the added inertia is, if it is not zero. */
