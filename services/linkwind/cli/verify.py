@@ -14,6 +14,7 @@ from linkwind.cli.options import JsonOption, LogArgument
 
 if TYPE_CHECKING:
     from linkwind.log.reader import Log
+    from linkwind.runs.diff import Compared, Growth
     from linkwind.runs.verify import Verified
     from linkwind.scenario import Scenario
 
@@ -23,6 +24,7 @@ DIFFERENT = 5  # exit code
 def register(app: typer.Typer) -> None:
     """Add the commands."""
     app.command()(verify)
+    app.command()(diff)
 
 
 def verify(
@@ -91,6 +93,58 @@ def _show(log: Log, scenario: Scenario, found: Verified) -> None:
             typer.echo(f"though made with another {', '.join(found.changed)}")
     if found.remark:
         typer.echo(f"note: {found.remark}")
+
+
+def diff(
+    one: Annotated[Path, typer.Argument(metavar="A", help="The MCAP log of a run.")],
+    other: Annotated[Path, typer.Argument(metavar="B", help="The MCAP log of another run.")],
+    rtol: Annotated[
+        float, typer.Option(min=0.0, help="Ignore differences up to this part of a field's largest value.")
+    ] = 0.0,
+    as_json: JsonOption = False,
+) -> None:
+    """Show what differs between two logs, where it starts and how it grows; exit code 5 if they differ.
+
+    Example: linkwind diff runs/a/log.mcap runs/b/log.mcap --rtol 1e-9
+    """
+    from linkwind.runs.diff import diff as compare
+
+    found = compare(one, other, rtol=rtol)
+    if as_json:
+        typer.echo(json.dumps(found.as_json()))
+    for remark in found.remarks:
+        typer.echo(f"note: {remark}", err=as_json)
+    if not as_json:
+        _show_diff(found, one, other, rtol)
+    if not found.identical:
+        raise typer.Exit(DIFFERENT)
+
+
+def _show_diff(found: Compared, one: Path, other: Path, rtol: float) -> None:
+    within = f" within {rtol:g} of the largest values" if rtol else ""
+    if found.first is None:
+        typer.echo(f"identical{within}: {found.points} communication points")
+        return
+    typer.echo(f"different; {found.points} communication points in common. The first difference is")
+    rows(found.first.lines("A", "B"))
+    if found.fields:
+        typer.echo(
+            f"{'field':>36}  {'first t [s]':>11}  {'largest':>9}  {'relative':>9}  {'at t [s]':>9}  body"
+        )
+    for d in found.fields:
+        start = f"{d.first.time_ns / 1e9:>11g}"
+        largest = f"{d.absolute:>9.2e}  {d.relative:>9.2e}  {d.t:>9g}"
+        typer.echo(f"{d.topic + ' ' + d.field:>36}  {start}  {largest}  {d.body or ''}")
+    if found.growth is not None:
+        _show_growth(found.growth)
+
+
+def _show_growth(growth: Growth) -> None:
+    typer.echo("largest difference of the accepted states up to each time, from the one before on:")
+    names = [name.removeprefix("motion.") for name in growth.fields]
+    typer.echo(f"{'t [s]':>11}" + "".join(f"  {name:>11}" for name in names))
+    for t, values in growth.rows:
+        typer.echo(f"{t:>11.6g}" + "".join(f"  {value:>11.2e}" for value in values))
 
 
 def rows(lines: Iterable[tuple[str, str]]) -> None:
