@@ -9,7 +9,7 @@ import pytest
 
 from linkwind.errors import InputError, SimulationError
 from linkwind.fmi.host import description
-from linkwind.fmi.host.instances import own_step_ns, stepping
+from linkwind.fmi.host.planning import own_step_ns, stepping
 from linkwind.scenario.providers import FmuModel
 from tests.fmi_host.foreign import Foreign, Variable, fmu
 

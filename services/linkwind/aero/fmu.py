@@ -12,7 +12,9 @@ import numpy as np
 from linkwind.aero.base import Capabilities, body_indices, item
 from linkwind.errors import InputError, ProtocolError, SimulationError
 from linkwind.fmi.host import description, listing, mapping
-from linkwind.fmi.host.instances import Instances, interface, own_step_ns, stepping
+from linkwind.fmi.host.instances import Instances
+from linkwind.fmi.host.links import Mapping, elements
+from linkwind.fmi.host.planning import interface, own_step_ns, stepping
 from linkwind.fmi.host.transfer import Inputs, Outputs
 from linkwind.scenario import Environment, Provider, Scenario
 from linkwind.scenario.providers import FmuModel
@@ -62,9 +64,7 @@ def _read(file: Path, settings: FmuModel) -> description.Description:
     return fmu
 
 
-def _table(
-    fmu: description.Description, found: mapping.Mapping, scenario: Scenario, provider: Provider
-) -> str:
+def _table(fmu: description.Description, found: Mapping, scenario: Scenario, provider: Provider) -> str:
     how = stepping(fmu, provider.fmu, scenario.coupling.step_ns)
     remarks = "".join(f"\nnote: {remark}" for remark in fmu.remarks)
     return f"{listing.text(fmu, found)}\n{how}{remarks}"
@@ -141,7 +141,7 @@ class ForceFmu:
 
     def _not_finite(self, t: float) -> SimulationError:
         row, place = np.argwhere(~np.isfinite(self._instances.outputs))[0]
-        names = [name for variable in self._mapping.output_variables for name in mapping.elements(variable)]
+        names = [name for variable in self._mapping.output_variables for name in elements(variable)]
         value = self._instances.outputs[row, place]
         self.close()
         of = f" of {self._mapping.bodies[row]}" if self._mapping.per_body else ""

@@ -5,11 +5,15 @@
 ``description``     what the FMU says about itself
 ``quantities``      what a host of forces can give and take, and the units of it
 ``names``           what a variable's name tells about it
+``entries``         what an entry of the scenario's table says
+``links``           what a mapping is made of
 ``mapping``         which variable is which quantity of which body: names and the scenario's table
 ``listing``         the mapping as a table to read, and as the beginning of one to write
 ``transfer``        motion → inputs, outputs → wrench
+``planning``        from abilities and settings to a plan
 ``plan``            what a worker has to know
-``binding``         FMPy's classes, FMI 2 and 3 alike
+``library``         FMPy's classes: every call marked and checked
+``binding``         one instance, FMI 2 and 3 alike
 ``cosimulation``    stepping
 ``modelexchange``   integrating
 ``runner``          the instances of one FMU

@@ -1,4 +1,4 @@
-"""FMPy's low-level classes with one manner: the same calls for FMI 2 and 3, every one marked and checked.
+"""One instance of an FMU with one manner: the same calls for FMI 2 and 3.
 
 The arrays of values lie in the memory that host and worker share, and the FMU reads and writes them there.
 """
@@ -6,92 +6,16 @@ The arrays of values lie in the memory that host and worker share, and the FMU r
 from __future__ import annotations
 
 import mmap
-from collections.abc import Callable, Sequence
-from ctypes import byref, c_double, c_uint
+from collections.abc import Sequence
+from ctypes import c_double, c_uint
 from typing import Any
 
-from fmpy import fmi2, fmi3
-from fmpy.logging import addLoggerProxy
+from fmpy import fmi2
 
+from linkwind.fmi.host.library import CLASSES, CallError, Log, callbacks2, logger3
 from linkwind.fmi.host.plan import Marker, Plan, Setting
 
-STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 MAX_EVENT_ITERATIONS = 1000
-
-Log = Callable[[str], None]
-
-
-class CallError(Exception):
-    """A call of the FMU that did not go well; the text says which and how."""
-
-
-class _Missing:
-    """A function that the library does not have; calling it is an error, loading is not."""
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-
-    def __call__(self, *arguments: object) -> None:
-        raise CallError(f"{self.name} is missing in its library")
-
-
-class _Library:
-    """The shared library, with a placeholder for each function that it lacks."""
-
-    def __init__(self, library: Any) -> None:
-        self._library = library
-
-    def __getattr__(self, name: str) -> Any:
-        try:
-            return getattr(self._library, name)
-        except AttributeError:
-            return _Missing(name)
-
-
-class _Checked:
-    """Mixed into FMPy's classes: marks each call and turns a bad status into a CallError."""
-
-    mark: Callable[[str], None]
-
-    def _loadFunctions(self) -> None:  # noqa: N802  FMPy's name
-        self.dll: Any = _Library(self.dll)
-        super()._loadFunctions()  # type: ignore[misc]
-
-    def _call(self, name: str, *arguments: Any) -> Any:
-        self.mark(name)
-        result = self._functions[name](*arguments)  # type: ignore[attr-defined]
-        if result.__class__ is int and result > 1 and "Instantiate" not in name:
-            got = STATUS[result] if result < len(STATUS) else f"status {result}"
-            raise CallError(f"{name} returned {got}")
-        return result
-
-
-class FMU2SlaveChecked(_Checked, fmi2.FMU2Slave):  # type: ignore[misc]
-    """FMI 2 Co-Simulation. FMPy derives the prefix of the functions from the first letters of the name."""
-
-
-class FMU2ModelChecked(_Checked, fmi2.FMU2Model):  # type: ignore[misc]
-    """FMI 2 Model Exchange."""
-
-
-class FMU3SlaveChecked(_Checked, fmi3.FMU3Slave):  # type: ignore[misc]
-    """FMI 3 Co-Simulation."""
-
-
-class FMU3ModelChecked(_Checked, fmi3.FMU3Model):  # type: ignore[misc]
-    """FMI 3 Model Exchange."""
-
-
-_CLASSES = {
-    (2, "cs"): FMU2SlaveChecked,
-    (2, "me"): FMU2ModelChecked,
-    (3, "cs"): FMU3SlaveChecked,
-    (3, "me"): FMU3ModelChecked,
-}
-
-
-def _text(raw: bytes | None) -> str:
-    return (raw or b"").decode(errors="replace").strip()
 
 
 class Binding:
@@ -119,7 +43,7 @@ class Binding:
             "instanceName": self._name,
         }
         try:
-            self.fmu: Any = _CLASSES[plan.version, plan.interface](**arguments)
+            self.fmu: Any = CLASSES[plan.version, plan.interface](**arguments)
         except Exception as error:
             raise CallError(" ".join(str(error).split())) from None
         self.fmu.mark = mark
@@ -143,17 +67,17 @@ class Binding:
     def _instantiate(self, plan: Plan, log: Log) -> None:
         try:
             if plan.version == 2:
-                self.fmu.instantiate(callbacks=_callbacks2(log), loggingOn=True)
+                self.fmu.instantiate(callbacks=callbacks2(log), loggingOn=True)
             elif plan.interface == "cs":
                 # Early return goes with events: without event mode there is nothing to return for.
                 self.fmu.instantiate(
                     loggingOn=True,
                     eventModeUsed=plan.event_mode,
                     earlyReturnAllowed=plan.event_mode,
-                    logMessage=_logger3(log),
+                    logMessage=logger3(log),
                 )
             else:
-                self.fmu.instantiate(loggingOn=True, logMessage=_logger3(log))
+                self.fmu.instantiate(loggingOn=True, logMessage=logger3(log))
         except CallError:
             raise
         except Exception:
@@ -268,28 +192,3 @@ class Binding:
             self.fmu.fmi2FreeInstance(self.fmu.component)
         else:
             self.fmu.fmi3FreeInstance(self.fmu.component)
-
-
-def _callbacks2(log: Log) -> Any:
-    """Return the callbacks of FMI 2; FMPy's proxy in C fills in the arguments of printf."""
-
-    def logger(_: Any, instance: bytes, status: int, category: bytes, message: bytes) -> None:
-        log(f"{_label(status)}{_text(message)}")
-
-    callbacks = fmi2.fmi2CallbackFunctions()
-    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(logger)
-    callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
-    callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
-    addLoggerProxy(byref(callbacks))
-    return callbacks
-
-
-def _logger3(log: Log) -> Callable[..., None]:
-    def logger(_: Any, status: int, category: bytes, message: bytes) -> None:
-        log(f"{_label(status)}{_text(message)}")
-
-    return logger
-
-
-def _label(status: int) -> str:
-    return f"[{STATUS[status] if 0 <= status < len(STATUS) else status}] "

@@ -6,7 +6,8 @@ For a force without memory that is the force at the new point.
 
 from __future__ import annotations
 
-from linkwind.fmi.host.binding import MAX_EVENT_ITERATIONS, Binding, CallError
+from linkwind.fmi.host.binding import MAX_EVENT_ITERATIONS, Binding
+from linkwind.fmi.host.library import CallError
 from linkwind.fmi.host.plan import Plan
 
 _TIME_EPSILON = 1e-12  # of the time: round-off in the times that an FMU reports

@@ -6,7 +6,7 @@ import mmap
 from collections import deque
 
 from linkwind.errors import SimulationError
-from linkwind.fmi.host.binding import CallError
+from linkwind.fmi.host.library import CallError
 from linkwind.fmi.host.plan import Plan
 from linkwind.fmi.host.process import last_lines
 from linkwind.fmi.host.runner import Runner

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from itertools import groupby
 
 from linkwind.fmi.host.description import Description
-from linkwind.fmi.host.mapping import Link, Mapping
+from linkwind.fmi.host.links import Link, Mapping
 from linkwind.fmi.host.quantities import INPUTS, OUTPUTS
 from linkwind.scenario.providers import FmuModel, FmuVariable
 

@@ -6,8 +6,6 @@ given a value; of the outputs, those that are mapped are read, and there has to 
 
 from __future__ import annotations
 
-import itertools
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
@@ -15,90 +13,15 @@ from typing import Literal
 
 from linkwind.errors import InputError
 from linkwind.fmi.host.description import Description, Unit, Variable
-from linkwind.fmi.host.names import Reading, likeness, read
+from linkwind.fmi.host.entries import affine, candidates, read_entry
+from linkwind.fmi.host.links import Link, Mapping, elements
+from linkwind.fmi.host.names import Reading, read
 from linkwind.fmi.host.quantities import INPUTS, OUTPUTS, exponents, known, to_si, unit_names
 from linkwind.scenario.providers import FmuModel, FmuVariable
 
-Vector3 = tuple[float, float, float]
 SHOWN = 6  # problems in one error
 _LEFT = ("Clock", "Binary")  # types that keep what the FMU starts with
 _GLOBAL = ("density", "wind")  # belong to no body in particular
-
-
-@dataclass(frozen=True)
-class Link:
-    """One element of a variable, and what it is.
-
-    Attributes:
-        element: its name, ``link1.r[2]`` for an element of an array.
-        index: its place among all values of inputs, or of outputs.
-        body: index among the provider's bodies; of one instance for each body always 0.
-        frame, point: of the quantity; the point is in the body frame, from the centre of mass [m].
-        gain, bias: input: FMU's value = gain · quantity + bias; output: quantity = gain · value + bias (SI).
-        unit: as the FMU names it, empty without.
-        by: how it was found.
-    """
-
-    element: str
-    index: int
-    quantity: str
-    component: int
-    body: int
-    frame: Literal["world", "body"] = "world"
-    point: Vector3 | None = None
-    gain: float = 1.0
-    bias: float = 0.0
-    unit: str = ""
-    by: Literal["name", "table"] = "name"
-
-    @property
-    def target(self) -> tuple[str, int, int]:
-        """What it is, to find two that are the same."""
-        return self.quantity, self.component, self.body
-
-
-@dataclass(frozen=True)
-class Mapping:
-    """The mapping of one FMU.
-
-    Attributes:
-        per_body: whether there is one instance for each body; links then speak of body 0.
-        bodies: names of the provider's bodies.
-        inputs, outputs: links, in the order of the values.
-        input_variables, output_variables: whose values are exchanged, in this order.
-        held: inputs that keep a value from the scenario.
-        unmapped: inputs that nothing is known about; none in a mapping to run with.
-        ignored: outputs that are not read.
-    """
-
-    per_body: bool
-    bodies: tuple[str, ...]
-    inputs: tuple[Link, ...]
-    outputs: tuple[Link, ...]
-    input_variables: tuple[Variable, ...]
-    output_variables: tuple[Variable, ...]
-    held: tuple[str, ...]
-    unmapped: tuple[str, ...]
-    ignored: tuple[str, ...]
-
-
-@dataclass
-class _Side:
-    """Inputs or outputs while they are being mapped."""
-
-    causality: Literal["input", "output"]
-    links: list[Link] = field(default_factory=list)
-    variables: list[Variable] = field(default_factory=list)
-    left: list[tuple[Variable, str]] = field(default_factory=list)
-    size: int = 0
-
-
-def elements(variable: Variable) -> list[str]:
-    """Return the names of the elements of a variable, in the order of its values."""
-    if not variable.shape:
-        return [variable.name]
-    ranges = (range(1, size + 1) for size in variable.shape)
-    return [f"{variable.name}[{','.join(map(str, index))}]" for index in itertools.product(*ranges)]
 
 
 def resolve(fmu: Description, settings: FmuModel, bodies: Sequence[str]) -> Mapping:
@@ -123,6 +46,17 @@ def survey(fmu: Description, settings: FmuModel, bodies: Sequence[str]) -> tuple
     """Map what can be mapped; return it with the problems that ``resolve`` would raise, a line each."""
     resolver = _Resolver(fmu, settings, tuple(bodies))
     return resolver.resolve(), resolver.problems
+
+
+@dataclass
+class _Side:
+    """Inputs or outputs while they are being mapped."""
+
+    causality: Literal["input", "output"]
+    links: list[Link] = field(default_factory=list)
+    variables: list[Variable] = field(default_factory=list)
+    left: list[tuple[Variable, str]] = field(default_factory=list)
+    size: int = 0
 
 
 class _Resolver:
@@ -202,43 +136,16 @@ class _Resolver:
         if entry is not None:
             if entry.quantity == "none":
                 return None
-            found = self._table(side.causality, variable, element, number, entry)
+            said = read_entry(side.causality, variable, number, entry, self._bodies)
+            found = said if isinstance(said, Reading) else None
+            if not isinstance(said, Reading):
+                self._problem(f'fmu.variables."{element}"', *said)
         else:
             found = read(element, side.causality, self._bodies, scalar=not variable.shape)
             entry = FmuVariable(quantity="by name")
         if found is None:
             return None
         return self._link(side, variable, element, number, found, entry)
-
-    def _table(
-        self, causality: str, variable: Variable, element: str, number: int, entry: FmuVariable
-    ) -> Reading | None:
-        """Return what the table says: ``[body.]quantity[.component]``."""
-        quantities = INPUTS if causality == "input" else OUTPUTS
-        parts = entry.quantity.split(".")
-        body = self._bodies.index(parts[0]) if parts[0] in self._bodies else None
-        parts = parts[body is not None :]
-        item = f'fmu.variables."{element}"'
-        if not parts or parts[0] not in quantities or len(parts) > 2:
-            expected = f"[body.]quantity[.component] with one of {', '.join(quantities)}"
-            advice = f"Bodies: {', '.join(self._bodies)}."
-            self._problem(item, expected, f'"{entry.quantity}"', advice)
-            return None
-        components = quantities[parts[0]].components
-        if len(parts) == 2:
-            if parts[1] in components:
-                return Reading(parts[0], components.index(parts[1]), body)
-        elif len(components) == 1:
-            return Reading(parts[0], 0, body)
-        elif variable.shape:
-            row, component = divmod(number, len(components))
-            if variable.size == len(components):
-                return Reading(parts[0], component, body)
-            if variable.size == len(components) * len(self._bodies) and body is None:
-                return Reading(parts[0], component, row)
-        got = f'"{entry.quantity}" for {variable.size} value{"s" * (variable.size > 1)}'
-        self._problem(item, f"one of the components {', '.join(components)}", got, "Add it after a dot.")
-        return None
 
     def _link(
         self,
@@ -266,7 +173,7 @@ class _Resolver:
             self._problem(
                 f'fmu.variables."{element}".frame', "world", "body", f"A {found.quantity} has no other."
             )
-        gain, bias = _affine(side.causality, factor, entry)
+        gain, bias = affine(side.causality, factor, entry)
         return Link(
             element=element,
             index=side.size + number,
@@ -324,33 +231,13 @@ class _Resolver:
                 f"input {element}", expected, f"none, for a {kind}", f'Write start."{variable.name}" = …'
             )
             return
-        near = self._candidates(variable, element)
+        near = candidates(variable, element)
         self._problem(
             f"input {element}",
             "a name that tells what it is, an entry in fmu.variables, or " + start,
             f"none of them, for a {kind}",
             f'Nearest: {", ".join(near)}. Write "{element}" = "{near[0]}" under fmu.variables.',
         )
-
-    def _candidates(self, variable: Variable, element: str) -> list[str]:
-        """Return the quantities whose words and unit are nearest."""
-        alike = likeness(element, variable.causality)
-        quantities = INPUTS if variable.causality == "input" else OUTPUTS
-        if variable.unit is not None:
-            for name in alike:
-                if not isinstance(to_si(variable.unit, exponents(name, 0)), str):
-                    alike[name] += 1.0
-        found = re.search(r"[._\[]?([xyz123])\]?$", element)
-        names = sorted(alike, key=lambda name: -alike[name])[:3]
-        near = []
-        for name in names:
-            components = quantities[name].components
-            letter = (
-                "xyz"["123".index(found[1])] if found and found[1] in "123" else found[1] if found else ""
-            )
-            component = letter if letter in components else components[0]
-            near.append(f"{name}.{component}" if component else name)
-        return near
 
     def _twice(self, outputs: list[Link]) -> None:
         first: dict[tuple[str, int, int], Link] = {}
@@ -383,11 +270,3 @@ class _Resolver:
 def _moves(quantity: str) -> bool:
     """Return whether the quantity depends on the point of the body that it is taken at."""
     return quantity in ("position", "velocity", "relative_velocity", "acceleration", "force")
-
-
-def _affine(causality: str, unit: tuple[float, float], entry: FmuVariable) -> tuple[float, float]:
-    """Put unit, scale and offset together; exact where there is nothing to convert."""
-    factor, shift = unit
-    if causality == "input":
-        return entry.scale / factor, (entry.offset - shift) / factor
-    return entry.scale * factor, entry.scale * shift + entry.offset

@@ -8,8 +8,9 @@ from collections.abc import Callable
 from enum import Enum, auto
 from typing import Any
 
-from linkwind.fmi.host.binding import Binding, CallError, Log
+from linkwind.fmi.host.binding import Binding
 from linkwind.fmi.host.cosimulation import CoSimulation
+from linkwind.fmi.host.library import CallError, Log
 from linkwind.fmi.host.modelexchange import ModelExchange
 from linkwind.fmi.host.plan import Marker, Plan
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwind.fmi.host.mapping import Link, Mapping, Vector3
+from linkwind.fmi.host.links import Link, Mapping, Vector3
 from linkwind.spatial import Array, Motion, Wrench
 
 Index = NDArray[np.intp]

@@ -15,8 +15,8 @@ import socket
 import sys
 from pathlib import Path
 
-from linkwind.fmi.host.binding import CallError
 from linkwind.fmi.host.channel import ANSWER, REQUEST, receive
+from linkwind.fmi.host.library import CallError
 from linkwind.fmi.host.plan import Plan
 from linkwind.fmi.host.runner import Runner
 
