@@ -15,7 +15,8 @@
     │   ├── AnswerTimeoutError           a participant is alive but does not answer
     │   ├── FaultError                   a participant reported that it cannot go on
     │   └── SimulationError              numerical trouble: NaN, singular inertia, step underflow
-    └── VerificationError            5   two runs that should be equal are not
+    ├── VerificationError            5   two runs that should be equal are not
+    └── StoppedError               130   somebody stopped the run: Ctrl-C or SIGTERM
 
 A message says what, which item, expected, got, and what to do.
 """
@@ -85,3 +86,9 @@ class VerificationError(LinkwindError):
     """Two runs that should be equal are not."""
 
     exit_code = 5
+
+
+class StoppedError(LinkwindError):
+    """Somebody stopped the run."""
+
+    exit_code = 130

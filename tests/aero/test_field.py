@@ -188,10 +188,10 @@ def test_a_provider_of_some_bodies_answers_in_its_own_order():
 
 
 def test_a_wrong_expression_is_named_as_the_user_wrote_it():
-    with pytest.raises(ExpressionError, match=r"^scene\.toml: aero\.field\.body\.tz: column 1: "):
+    with pytest.raises(ExpressionError, match=r"^scene: aero\.field\.body\.tz: column 1: "):
         model(THETA, "aero.field.body.tz=oops")
     scenario = loads(SUBSET.replace('"x"', '"2*q"'), "subset")
-    with pytest.raises(ExpressionError, match=r"^subset\.toml: providers\[1\]\.field\.a\.fy: column 3: "):
+    with pytest.raises(ExpressionError, match=r"^subset: providers\[1\]\.field\.a\.fy: column 3: "):
         aero.build(scenario, scenario.providers[1])
 
 
@@ -202,7 +202,7 @@ def test_a_value_that_is_not_finite_ends_the_run(text, value):
     with pytest.raises(SimulationError) as caught:
         field.evaluate(0.125, Motion.at_rest(1), Wrench.zeros(1))
     message = str(caught.value)
-    assert message.startswith("scene.toml: aero.field.body.tz: expected a finite number at t = 0.125 s; got ")
+    assert message.startswith("scene: aero.field.body.tz: expected a finite number at t = 0.125 s; got ")
     assert f"got {value}" in message.replace("-nan", "nan")
     assert "x = 0, y = 0, z = 0, vx = 0" in message
     assert "theta = 0." in message

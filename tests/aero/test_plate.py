@@ -175,7 +175,7 @@ def test_two_observers_in_uniform_motion_find_the_same_forces(coefficients):
 
 def test_a_diverged_motion_is_reported_with_plate_time_and_state(plate):
     motion = planar(np.inf, 0.0, 0.0)
-    with pytest.raises(SimulationError, match=r'scene\.toml: plate "plate": .* t = 0\.25 s.*velocity \[inf'):
+    with pytest.raises(SimulationError, match=r'scene: plate "plate": .* t = 0\.25 s.*velocity \[inf'):
         plate.evaluate(0.25, motion, Wrench.zeros(1, added_inertia=True))
 
 
@@ -183,7 +183,7 @@ def test_a_body_that_is_no_plate_is_refused():
     scenario = loads(PLATE, "scene")
     body = scenario.bodies[0].model_copy(update={"shape": None})
     broken = scenario.model_copy(update={"bodies": (body,)})
-    expected = r'scene\.toml: bodies\[0\]\.shape: expected type "plate" with length and span.*got none'
+    expected = r'scene: bodies\[0\]\.shape: expected type "plate" with length and span.*got none'
     with pytest.raises(ScenarioError, match=expected):
         aero.build(broken, broken.providers[0])
 

@@ -157,7 +157,7 @@ def test_endpoint_in_use_is_an_error_that_says_so(
     endpoint: str, open_link: Callable[..., ZenohDynamicsLink]
 ) -> None:
     open_link(session())
-    with pytest.raises(InputError, match=f"cannot listen on {endpoint}.*Is another dynamics running there"):
+    with pytest.raises(InputError, match=f"cannot listen on {endpoint}.*is another dynamics running there"):
         open_link(session())
 
 
@@ -269,3 +269,75 @@ def test_nonsense_on_a_wrench_key_is_an_error_with_a_name(
     provider.join(10.0)
     assert isinstance(provider.error, FaultError)
     stranger.close()
+
+
+def test_first_motion_is_sent_again_to_whoever_has_not_answered(
+    endpoint: str, open_link: Callable[..., ZenohDynamicsLink]
+) -> None:
+    """One provider hears the first motion, the other subscribes only when it has gone out."""
+    d = session("early", "late")
+    link = open_link(d)
+    early = Provider(endpoint, FakeModel(), "early")
+    model = FakeModel()
+    late = ProviderSession("late", lambda scenario, name: model)
+    slow = ZenohProviderLink([endpoint], [])
+    late.welcome(slow.request(late.hello(), 10.0))
+    late.build()
+    late.started(slow.request(late.ready(), 10.0))
+    assert link.wait(lambda: not d.not_ready, 10.0, lambda: None)
+    link.post(d.post(0, 0))
+    assert d.accept(*link.receive())
+    assert d.unanswered == ["late"]
+    slow.join("r1", "late")
+    answering = threading.Thread(target=lambda: slow.reply(late.answer(slow.receive()) or b""))
+    answering.start()
+    while not d.answered:
+        d.accept(*link.receive())
+    answering.join(10.0)
+    assert model.calls == [("evaluate", 0.0)]
+    link.fault(fault("dynamics", 0, 0, LostError("the test is over")))
+    early.join(10.0)
+    slow.close()
+
+
+def test_time_that_the_dynamics_takes_itself_is_not_the_provider_s(
+    endpoint: str, open_link: Callable[..., ZenohDynamicsLink]
+) -> None:
+    d = session()
+    link = open_link(d, timeout=0.3)
+    provider = Provider(endpoint, FakeModel())
+    assert link.wait(lambda: not d.not_ready, 10.0, lambda: None)
+    exchange(d, link, 0)
+    link.post(d.post(1, 0))
+    threading.Event().wait(0.8)  # a slow disk: the answer has long been here
+    assert d.accept(*link.receive())
+    for step in range(2, 11):
+        exchange(d, link, step)
+    finish(d, link)
+    provider.join(10.0)
+    assert provider.error is None
+
+
+def test_reader_that_is_busy_does_not_fill_its_own_queue(
+    endpoint: str, open_link: Callable[..., ZenohDynamicsLink], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The watchdog wakes up a reader that waits; nobody would take away what it sent to one that does not."""
+    woken = []
+    monkeypatch.setattr(ZenohDynamicsLink, "_wake", lambda self: woken.append(self._reading))
+    open_link(session())
+    threading.Event().wait(0.5)
+    assert woken == []
+
+
+@pytest.mark.parametrize("name", ["", "a/b", "*", "a b"])
+def test_names_that_mean_something_in_a_key_are_refused(endpoint: str, name: str) -> None:
+    with pytest.raises(InputError, match="--run: expected letters"):
+        ZenohDynamicsLink(DynamicsSession(name, "{}", 1, 1, ["a"], {"aero": ["a"]}), [endpoint], [], 1.0)
+    if name != "*":
+        with pytest.raises(InputError, match="--run: expected letters"):
+            ZenohProviderLink([endpoint], [], name)
+
+
+def test_endpoint_that_is_none_is_an_error_of_ours() -> None:
+    with pytest.raises(InputError, match="zenoh: cannot connect to foo"):
+        ZenohProviderLink(["foo"], [])

@@ -203,12 +203,15 @@ def test_interrupted_run_closes_its_log_and_ends_its_children(programs: Programs
     children = Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text().split()
     assert len(children) == 1
     run.send_signal(number)
-    code, _, took = finish(run)
+    code, errors, took = finish(run)
     assert code == 130
+    assert "stopped at step " in errors
+    assert (programs.folder / "out" / "report.html").exists()
     assert took < 5.0
     assert not Path(f"/proc/{children[0]}").exists()
     log = open_log(programs.log())
     assert not log.complete
+    assert "StoppedError" in str(log.error)
     assert log.damage is None
 
 

@@ -86,7 +86,7 @@ WRONG = [
 def test_a_wrong_mechanism_gets_its_line(scenario, line):
     with pytest.raises(MechanismError) as error:
         build(scenario)
-    assert str(error.value) == f"case.toml: {line}"
+    assert str(error.value) == f"{scenario.source}: {line}"
 
 
 def test_springs_and_dampers():

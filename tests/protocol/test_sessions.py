@@ -315,3 +315,23 @@ def test_fault_names_participant_step_and_cause(
     assert str(d.failure) == '"aero" stopped at step 1: SimulationError: alpha is out of range'
     with pytest.raises(ProtocolError, match="control: expected one of fault"):
         raise fault_error(p.hello())
+
+
+def test_provider_that_died_before_ready_can_be_replaced() -> None:
+    d, first, second = dynamics(), provider(), provider()
+    first.welcome(d.control(first.hello()))
+    shake_hands(d, second)
+    assert d.not_ready == []
+    first.build()
+    with pytest.raises(RefusedError, match="Ready without Hello"):
+        first.started(d.control(first.ready()))
+
+
+def test_every_commit_is_a_place_to_go_back_to(
+    pair: tuple[DynamicsSession, ProviderSession, FakeModel],
+) -> None:
+    d, p, model = pair
+    before = len(model.blobs)
+    for step in range(4):
+        exchange(d, p, step)
+    assert len(model.blobs) == before + 3

@@ -83,7 +83,8 @@ def test_aero_can_be_set_where_the_file_has_no_provider():
          'coupling.adaptive: expected true or false; got "True". Write true or false, without quotes.'),
         ("bodies.link1.mass=inf",
          "bodies[0].mass: expected a finite number [kg]; got inf. Change the value."),
-        ("aero.model=plats", 'aero.model: expected one of none, field, plate, fmu; got "plats". Use "plate".'),
+        ("aero.model=plats",
+         'aero.model: expected one of none, field, plate, fmu; got "plats". Use "plate".'),
         ("bodies=3", "bodies: expected a list; got 3. Write it as [[table]] or [a, b]."),
     ],
 )  # fmt: skip

@@ -29,7 +29,7 @@ class Flight:
     def __init__(self, name, step, scheme="pec", field=None, **settings):
         integrator = settings.pop("integrator", "rk4")
         scenario = load(name, [f"coupling.step={step!r}", f'dynamics.integrator="{integrator}"'])
-        plant = MechanismPlant(build(scenario), scenario)
+        plant = MechanismPlant(build(scenario), scenario, lambda: "the start")
         answer = two_link.exchange(field or FIELDS[name], step)
         self.exchanges = 0
 

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from linkwind.dynamics.timing import ExchangeTimes
+from linkwind.errors import InputError, SimulationError
 from linkwind.log.reader import open_log
 from linkwind.runs.run import Outcome, run
 from linkwind.scenario import builtin_names, load
@@ -74,3 +76,79 @@ def test_summary_as_json_is_plain_and_complete(tmp_path: Path) -> None:
     assert len(summary["final_state_sha256"]) == 64
     free = fly("two_link_free", tmp_path / "free", "bus.transport=inprocess")
     assert free.as_json()["joint_gap_max_m"] is None
+
+
+def test_what_the_coupling_did_follows_from_the_messages(tmp_path: Path) -> None:
+    """Residual and interface energy, computed again from the logged trial and accepted states."""
+    outcome = fly("two_link", tmp_path / "out", "bus.transport=inprocess")
+    log = open_log(outcome.log)
+    steps, path = log.steps_table(), log.trajectory()
+    trial = log.columns("/motion")
+    wrench = log.columns("/wrench/aero")
+    n = 2
+    for k in range(10, 200):
+        linear = path.linear[k] - trial["trial.linear"][k].reshape(n, 3)
+        angular = path.angular[k] - trial["trial.angular"][k].reshape(n, 3)
+        # two_link: mass 2 kg; inertia 1.4 kg m2 about z, half of that about x and y (mechanism/tables.py)
+        kinetic = 2.0 * (linear**2).sum() + (0.7 + 0.7 + 1.4) / 3.0 * (angular**2).sum()
+        power = (wrench["force"][k].reshape(n, 3) * linear).sum()
+        power += (wrench["torque"][k].reshape(n, 3) * angular).sum()
+        assert math.isclose(steps.residual[k], math.sqrt(kinetic), rel_tol=1e-9, abs_tol=1e-15)
+        assert math.isclose(steps.interface_energy[k], power * 1e-3, rel_tol=1e-6, abs_tol=1e-18)
+    assert steps.residual[10:].max() > 0.0
+
+
+def test_progress_goes_up_to_the_end(tmp_path: Path) -> None:
+    seen: list[int] = []
+    run(load("two_link", [*SHORT, "bus.transport=inprocess"]), tmp_path / "out", seen.append)
+    assert seen == sorted(seen)
+    assert seen[-1] == 200
+    assert len(seen) > 100
+
+
+def test_numerical_trouble_names_step_body_and_time(tmp_path: Path) -> None:
+    settings = ["bus.transport=inprocess", 'aero.field.link1.fx="1e4*vx*vx*vx"']
+    with pytest.raises(
+        SimulationError, match=r'exchange of step \d+ \(t = .* s\): body "link\d": expected finite'
+    ):
+        run(load("two_link_field", settings), tmp_path / "out", lambda step: None)
+    assert "SimulationError" in str(open_log(tmp_path / "out" / "log.mcap").error)
+
+
+@pytest.mark.parametrize(
+    ("setting", "expected"),
+    [
+        ('aero.field.link1.fx="1+*t"', "aero.field.link1.fx"),
+        ("bodies.link2.position=[9, 0]", "bodies"),
+    ],
+)
+def test_bad_input_leaves_nothing_behind(tmp_path: Path, setting: str, expected: str) -> None:
+    with pytest.raises(InputError, match=expected):
+        run(load("two_link_field", [setting]), tmp_path / "out", lambda step: None)
+    assert not (tmp_path / "out").exists()
+
+
+def test_report_that_cannot_be_written_does_not_hide_the_result(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(self: Path, *arguments: object, **options: object) -> int:
+        raise OSError(28, "No space left on device", str(self))
+
+    monkeypatch.setattr(Path, "write_text", full)
+    outcome = fly("two_link", tmp_path / "out", "bus.transport=inprocess")
+    assert outcome.result.steps == 200
+    assert "No space left on device" in outcome.report_trouble
+    assert outcome.as_json()["report"] is None
+    assert open_log(outcome.log).complete
+
+
+def test_exchange_times_are_counted_in_constant_memory() -> None:
+    times = ExchangeTimes()
+    samples = np.random.default_rng(0).lognormal(12.0, 1.0, 5000).astype(int).tolist()
+    for sample in samples:
+        times.add(sample)
+    for q in (0.5, 0.99):
+        assert math.isclose(times.quantile_us(q), np.quantile(samples, q) / 1e3, rel_tol=0.011)
+    times.add(0)
+    times.add(10**15)
+    assert times.count == 5002

@@ -19,7 +19,7 @@ from linkwind.aero.plate import Plate
 from linkwind.errors import InputError
 from linkwind.scenario import Provider, Scenario
 
-__all__ = ["FROM_FILE", "MODELS", "Capabilities", "ForceModel", "build"]
+__all__ = ["FROM_FILE", "MODELS", "Capabilities", "ForceModel", "build", "check"]
 
 MODELS: dict[str, Callable[[Scenario, Provider], ForceModel]] = {
     "none": Vacuum,
@@ -53,3 +53,14 @@ def build(scenario: Scenario, provider: Provider, file: Path | None = None) -> F
             f"the dynamics with --set {table(scenario, provider)}.model=fmu."
         )
     return MODELS[provider.model](scenario, provider)
+
+
+def check(scenario: Scenario) -> None:
+    """Find what is wrong with the settings of a model before anything is started.
+
+    Raises:
+        InputError: the scenario does not give what a model needs.
+    """
+    for provider in scenario.providers:
+        if provider.model not in FROM_FILE:
+            build(scenario, provider)

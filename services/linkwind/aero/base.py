@@ -72,7 +72,7 @@ def table(scenario: Scenario, provider: Provider) -> str:
 
 def item(scenario: Scenario, provider: Provider, *keys: str) -> str:
     """Return how a user finds a setting of a provider: ``two_link.toml: aero.field.link1``."""
-    return f"{scenario.name}.toml: {'.'.join((table(scenario, provider), *keys))}"
+    return f"{scenario.source}: {'.'.join((table(scenario, provider), *keys))}"
 
 
 def body_indices(scenario: Scenario, provider: Provider) -> list[int]:

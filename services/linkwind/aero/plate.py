@@ -28,7 +28,7 @@ def plate_table(scenario: Scenario, provider: Provider) -> PlateTable:
         if shape is None or shape.type != "plate":
             got = f'type "{shape.type}"' if shape else "none"
             raise ScenarioError(
-                f'{scenario.name}.toml: bodies[{index}].shape: expected type "plate" with length and span, '
+                f'{scenario.source}: bodies[{index}].shape: expected type "plate" with length and span, '
                 f'for aero model "plate"; got {got}. Add shape = {{ type = "plate", length = … }}.'
             )
         size.append((shape.length, shape.span))
@@ -57,7 +57,7 @@ class Plate:
 
     def __init__(self, scenario: Scenario, provider: Provider) -> None:
         self._plates = Plates(plate_table(scenario, provider))
-        self._file, self._bodies = f"{scenario.name}.toml", provider.bodies
+        self._file, self._bodies = f"{scenario.source}", provider.bodies
 
     def commit(self, t: float, motion: Motion) -> None:
         """Do nothing: the forces depend on the present alone."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import logging
 from pathlib import Path
 
 from linkwind import aero
@@ -9,6 +11,8 @@ from linkwind.bus.base import ProviderLink
 from linkwind.errors import FaultError, LostError
 from linkwind.protocol import Model, ProviderSession, ProviderState
 from linkwind.scenario import from_json
+
+_log = logging.getLogger("linkwind")
 
 GOODBYE_TIMEOUT = 2.0  # s; a dynamics that is gone by then does not need the Bye
 
@@ -42,7 +46,9 @@ def serve(link: ProviderLink, provider: ProviderSession, start_timeout: float) -
         FaultError: somebody else ended the run.
         SimulationError: the force model failed (the dynamics has been told).
     """
+    _log.info('"%s": waiting for a dynamics', provider.name)
     provider.welcome(link.request(provider.hello(), start_timeout))
+    _log.info('"%s": takes part in run %s', provider.name, provider.run)
     try:
         provider.build()
         link.join(provider.run, provider.name)
@@ -53,8 +59,10 @@ def serve(link: ProviderLink, provider: ProviderSession, start_timeout: float) -
                 link.reply(answer)
     except Exception as error:
         if not isinstance(error, LostError | FaultError):
-            link.request(provider.fault(error), GOODBYE_TIMEOUT)
+            with contextlib.suppress(LostError):  # nobody is left to be told
+                link.request(provider.fault(error), GOODBYE_TIMEOUT)
         raise
     finally:
         provider.close()
     link.request(provider.bye(), GOODBYE_TIMEOUT)
+    _log.info('"%s": done, step %d was the last', provider.name, provider.at[0])

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import socket
 import threading
 import time
@@ -38,8 +39,7 @@ def open_session(listen: Sequence[str], connect: Sequence[str]) -> zenoh.Session
     Raises:
         InputError: an endpoint cannot be opened.
     """
-    config = zenoh.Config()
-    for key, value in {
+    settings = {
         "mode": "peer",
         "listen/endpoints": list(listen),
         "connect/endpoints": list(connect),
@@ -51,16 +51,30 @@ def open_session(listen: Sequence[str], connect: Sequence[str]) -> zenoh.Session
         "transport/unicast/open_timeout": int(LEASE * 1000),
         "transport/link/tx/lease": int(LEASE * 1000),
         "transport/link/tx/keep_alive": 4,
-    }.items():
-        config.insert_json5(key, json.dumps(value))
+    }
     try:
+        config = zenoh.Config()
+        for key, value in settings.items():
+            config.insert_json5(key, json.dumps(value))
         return zenoh.open(config)
     except zenoh.ZError as error:
         where = f"listen on {', '.join(listen)}" if listen else f"connect to {', '.join(connect)}"
+        reason = str(error).split(" at /")[0]  # without the place in zenoh's sources
         raise InputError(
-            f"zenoh: cannot {where}: {error}. Is another dynamics running there? Give a free endpoint, for "
-            "example tcp/127.0.0.1:7448"
+            f"zenoh: cannot {where}: {reason}. Expected a free endpoint such as tcp/127.0.0.1:7448; is "
+            "another dynamics running there, is the address this machine's?"
         ) from error
+
+
+def key_segment(value: str, what: str) -> str:
+    """Return ``value`` if it may stand in a bus key.
+
+    Raises:
+        InputError: it is empty or has characters that mean something in a key.
+    """
+    if not re.fullmatch(r"[A-Za-z0-9_.-]+", value):
+        raise InputError(f'{what}: expected letters, digits, "_", "-" and "."; got "{value}"')
+    return value
 
 
 def loopback_endpoint() -> str:
@@ -199,15 +213,15 @@ class ZenohDynamicsLink(_Endpoint):
         Raises:
             InputError: an endpoint cannot be opened.
         """
+        base = f"{PREFIX}/{key_segment(session.run, '--run')}"
         super().__init__(listen, connect)
         self._exchanging = session
         self._timeout = timeout
         self._posted_at = float("inf")
-        self._late_since = float("nan")
-        self._payload = b""
+        self._waiting_since = float("inf")
+        self._first_motion = b""
         self._resend_at: float | None = None
         self._changed = threading.Condition()
-        base = f"{PREFIX}/{session.run}"
         self._join(f"{base}/wrench/*", f"{base}/motion", session.run, "dynamics")
         self._control = self._session.declare_queryable(f"{base}/control", self._on_control, complete=True)
 
@@ -229,16 +243,11 @@ class ZenohDynamicsLink(_Endpoint):
             )
 
     def _check(self) -> None:
-        waited = time.monotonic() - self._posted_at
-        if self._resend_at is not None and waited > self._resend_at:
-            self._resend_at *= 2.0
-            self._outgoing.put(self._payload)
-        if waited <= self._timeout or not self._exchanging.unanswered:
-            return
-        # Only what two looks in a row saw is late: the first may fall between stamp and post.
-        if self._late_since != self._posted_at:
-            self._late_since = self._posted_at
-        else:
+        now, resend_at = time.monotonic(), self._resend_at
+        if resend_at is not None and now > resend_at:
+            self._resend_at = now + 2.0 * (now - self._posted_at)
+            self._outgoing.put(self._first_motion)
+        if now - self._waiting_since > self._timeout:
             late = " and ".join(f'"{name}"' for name in self._exchanging.unanswered)
             self._fail(
                 AnswerTimeoutError(
@@ -262,10 +271,11 @@ class ZenohDynamicsLink(_Endpoint):
 
     def post(self, motion: bytes) -> None:
         """Send a motion message to every provider."""
-        if not self._payload:
-            self._resend_at = FIRST_RESEND
-        self._payload = motion
-        self._posted_at = time.monotonic()
+        self._resend_at = None
+        if not self._first_motion:
+            self._first_motion = motion
+            self._posted_at = time.monotonic()
+            self._resend_at = self._posted_at + FIRST_RESEND
         self._outgoing.put(motion)
 
     def fault(self, payload: bytes) -> None:
@@ -274,8 +284,10 @@ class ZenohDynamicsLink(_Endpoint):
 
     def receive(self) -> tuple[str, bytes]:
         """Return the next wrench message and its provider; see :class:`~linkwind.bus.base.DynamicsLink`."""
+        # The provider's time to answer runs while the dynamics waits, not while it writes its log.
+        self._waiting_since = time.monotonic()
         sample = self._receive(SPIN)
-        self._resend_at = None
+        self._waiting_since = float("inf")
         return str(sample.key_expr).rsplit("/", 1)[1], sample.payload.to_bytes()
 
 
@@ -290,8 +302,8 @@ class ZenohProviderLink(_Endpoint):
             listen: zenoh endpoints to listen on.
             run: id of the run to take part in, ``*`` for the only one that is there.
         """
+        self._run = run if run == "*" else key_segment(run, "--run")
         super().__init__(listen, connect)
-        self._run = run
         self._connect = connect
         self._dynamics_seen = False
         self._joined_at = float("inf")
@@ -324,9 +336,11 @@ class ZenohProviderLink(_Endpoint):
 
     def join(self, run: str, name: str) -> None:
         """Take part in ``run``: from now on motion messages come in."""
-        self._run = run
+        self._run = key_segment(run, "--run")
         self._joined_at = time.monotonic()
-        self._join(f"{PREFIX}/{run}/motion", f"{PREFIX}/{run}/wrench/{name}", run, name)
+        self._join(
+            f"{PREFIX}/{run}/motion", f"{PREFIX}/{run}/wrench/{key_segment(name, '--name')}", run, name
+        )
 
     def _seen(self, name: str, present: bool) -> None:
         if name == "dynamics":

@@ -74,6 +74,6 @@ def refuse_missing(scenario: Scenario, files: dict[str, Path]) -> None:
     for provider in scenario.providers:
         if provider.model == "fmu" and provider.name not in files:
             raise InputError(
-                f'{scenario.name}.toml: provider "{provider.name}": expected the file of its FMU; got '
+                f'{scenario.source}: provider "{provider.name}": expected the file of its FMU; got '
                 f"none. Add --force-fmu {provider.name}=FILE."
             )

@@ -98,10 +98,18 @@ def _show(scenario: Scenario, job: Callable[[Progress], Outcome], *, as_json: bo
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task(f"{scenario.name} (steps)", total=scenario.steps)
-        outcome = job(lambda step: bar.update(task, completed=step))
-        bar.update(task, completed=scenario.steps)
+    bar = Progress(*columns, console=Console(stderr=True))
+    task = bar.add_task(f"{scenario.name} (steps)", total=scenario.steps)
+
+    def progress(step: int) -> None:
+        bar.start()  # not before there is something to show
+        bar.update(task, completed=step)
+
+    try:
+        outcome = job(progress)
+        progress(scenario.steps)
+    finally:
+        bar.stop()
     _print_summary(outcome)
 
 
@@ -115,7 +123,7 @@ def _print_summary(outcome: Outcome) -> None:
         "largest joint gap": "no joints" if gap is None else f"{gap:.2g} m",
         "largest aerodynamic force": f"{summary['force_max_N']:.4g} N",
         "log": summary["log"],
-        "report": summary["report"],
+        "report": outcome.report_trouble or summary["report"],
     }
     for name, value in rows.items():
         typer.echo(f"{name:>26}  {value}")

@@ -18,7 +18,8 @@ from linkwind.bus.base import DynamicsLink
 from linkwind.coupling import SCHEMES, Answer, CommunicationPoint, Settings
 from linkwind.dynamics.plant import MechanismPlant, State
 from linkwind.dynamics.recorder import Recorder
-from linkwind.errors import LostError
+from linkwind.dynamics.timing import ExchangeTimes
+from linkwind.errors import LostError, StoppedError
 from linkwind.mechanism import Mechanism
 from linkwind.protocol import DynamicsSession, fault
 from linkwind.scenario import Scenario
@@ -35,7 +36,7 @@ class Result:
         steps: macro steps done.
         exchanges: motions answered.
         wall_s: wall clock from the first to the last exchange [s].
-        exchange_us: wall clock of each exchange, from posting to the last answer [µs], shape (exchanges,).
+        exchange_us: wall clock of the exchanges, from posting to the last answer.
         joint_gap_max_m: largest distance of two joint points, from the poses; None without joints [m].
         force_max_N: largest aerodynamic force on a body [N].
         final_state_sha256: of the last accepted poses and twists, little-endian float64, body by body.
@@ -44,7 +45,7 @@ class Result:
     steps: int
     exchanges: int
     wall_s: float
-    exchange_us: Array
+    exchange_us: ExchangeTimes
     joint_gap_max_m: float | None
     force_max_N: float  # noqa: N815  the unit's symbol
     final_state_sha256: str
@@ -65,11 +66,10 @@ class DynamicsService:
         )
         self._scenario = scenario
         self.mechanism = mechanism
-        self._plant = MechanismPlant(mechanism, scenario)
+        self._plant = MechanismPlant(mechanism, scenario, self.session.where)
         self.multibody = self._plant.multibody
         self._pending: deque[CommunicationPoint] = deque()
-        self._exchange_ns = np.zeros(scenario.steps + 1, dtype=np.int64)
-        self._exchanges = 0
+        self._times = ExchangeTimes()
 
     def run(
         self,
@@ -89,22 +89,29 @@ class DynamicsService:
         Raises:
             LostError: a provider did not come, died or was stopped.
             AnswerTimeoutError, FaultError, ProtocolError, SimulationError: as they say.
+            StoppedError: Ctrl-C or SIGTERM.
         """
         self._link, self._recorder = link, recorder
         try:
-            self._await_providers(poll)
-            start = time.perf_counter()
-            final = self._march(progress)
-            wall = time.perf_counter() - start
-            self._say_goodbye(final, poll)
+            # A state that blows up is stopped by the core, with a reason; the log shows the way there.
+            with np.errstate(over="ignore", invalid="ignore"):
+                self._await_providers(poll)
+                start = time.perf_counter()
+                final = self._march(progress)
+                wall = time.perf_counter() - start
+                self._say_goodbye(final, poll)
+        except KeyboardInterrupt:
+            stopped = StoppedError(f"stopped at {self.session.where()}")
+            link.fault(fault("dynamics", *self.session.motion.at, stopped))
+            raise stopped from None
         except BaseException as error:
             link.fault(fault("dynamics", *self.session.motion.at, error))
             raise
         return Result(
             steps=self._scenario.steps,
-            exchanges=self._exchanges,
+            exchanges=self._times.count,
             wall_s=wall,
-            exchange_us=self._exchange_ns[: self._exchanges] / 1e3,
+            exchange_us=self._times,
             joint_gap_max_m=recorder.joint_gap_max if self.mechanism.has_joints else None,
             force_max_N=recorder.force_max,
             final_state_sha256=self._digest(final),
@@ -152,15 +159,10 @@ class DynamicsService:
             provider, answer = link.receive()
             if session.accept(provider, answer):
                 self._recorder.wrench(provider, answer, motion.time_ns)
-        self._count(step, time.perf_counter_ns() - start)
+        took = time.perf_counter_ns() - start
+        self._times.add(took)
+        self._recorder.timing(step, motion.time_ns, took)
         return Answer(*session.total())
-
-    def _count(self, step: int, exchange_ns: int) -> None:
-        if self._exchanges == len(self._exchange_ns):
-            self._exchange_ns = np.concatenate([self._exchange_ns, np.zeros_like(self._exchange_ns)])
-        self._exchange_ns[self._exchanges] = exchange_ns
-        self._exchanges += 1
-        self._recorder.timing(step, self.session.motion.time_ns, exchange_ns)
 
     def _write_pending(self) -> None:
         while self._pending:

@@ -132,7 +132,7 @@ def aero_part(scenario: Scenario, *, native_arrays: bool) -> Part:
     if provider is None:
         models = " and ".join(f'"{entry.model}"' for entry in scenario.providers)
         raise InputError(
-            f"{scenario.name}.toml: providers: expected one with model plate or field, to export it; got "
+            f"{scenario.source}: providers: expected one with model plate or field, to export it; got "
             f"{models}. Export the other half with --part dynamics."
         )
     mechanism = build(scenario)

@@ -57,7 +57,7 @@ def build(scenario: Scenario) -> Mechanism:
     bodies: dict[int, Start] = {WORLD: WORLD_START}
     joints: dict[int, JointStart] = {}
     for i in order([carrier.parent for carrier in carried]):
-        item = f"{scenario.name}.toml: bodies[{i}]"
+        item = f"{scenario.source}: bodies[{i}]"
         bodies[i], joints[i] = start(scenario.bodies[i], carried[i], bodies[carried[i].parent], item)
     starts = [joints[i] for i in range(len(carried))]
     return Mechanism(

@@ -56,11 +56,11 @@ def carriers(scenario: Scenario) -> list[Carrier]:
     index = {body.name: i for i, body in enumerate(scenario.bodies)} | {"world": WORLD}
     root = "planar" if scenario.planar else "free"
     found = [
-        Carrier(f"world-{body.name}", root, WORLD, None, f"{scenario.name}.toml: bodies[{i}]")
+        Carrier(f"world-{body.name}", root, WORLD, None, f"{scenario.source}: bodies[{i}]")
         for i, body in enumerate(scenario.bodies)
     ]
     for i, joint in enumerate(scenario.joints):
-        item = f"{scenario.name}.toml: joints[{i}]"
+        item = f"{scenario.source}: joints[{i}]"
         if scenario.planar:
             _check_planar(joint, item)
         found[index[joint.child]] = Carrier(joint.name, joint.type, index[joint.parent], joint, item)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from linkwind.errors import SimulationError
@@ -14,9 +15,9 @@ class Fault(ctypes.Structure):
     _fields_ = [("item", ctypes.c_int32), ("time", ctypes.c_double)]
 
 
-_REPAIR = "Check forces, stiffnesses and the step size"
+_REPAIR = "Check forces, stiffnesses and dampers; a smaller step, more substeps or dopri5 may help"
 _NUMERICS = {
-    1: ("joint {item}", "inertia to move its body {item}", "a singular inertia",
+    1: ("joint of body {item}", "inertia to move the body", "a singular inertia",
         "Give the body mass, inertia or added inertia"),
     2: ("body {item}", "finite coordinates", "an overflow", _REPAIR),
     3: ("dopri5", "a substep that meets the tolerance", "a substep that shrank to nothing", _REPAIR),
@@ -24,6 +25,7 @@ _NUMERICS = {
     5: ("added inertia of body {item}", "finite numbers", "NaN or infinity", "Check the force provider"),
     6: ("state[{item}]", "a finite number", "NaN or infinity", _REPAIR),
 }  # fmt: skip
+_UNNAMED = (3, 6)  # the item is no body
 _ARGUMENTS = {
     20: ("h", "a positive macro step [s]"),
     21: ("nodes", "1 to 8 distinct finite nodes"),
@@ -33,7 +35,7 @@ _ARGUMENTS = {
 }
 
 
-def fail(status: int, fault: Fault, arguments: dict[str, Any]) -> NoReturn:
+def fail(status: int, fault: Fault, bodies: Sequence[str], arguments: dict[str, Any]) -> NoReturn:
     """Raise what the core reported.
 
     Raises:
@@ -43,7 +45,8 @@ def fail(status: int, fault: Fault, arguments: dict[str, Any]) -> NoReturn:
     if status in _ARGUMENTS:
         name, expected = _ARGUMENTS[status]
         raise ValueError(f"{name}: expected {expected}; got {arguments[name]}. Correct the call.")
-    subject, expected, found, repair = (text.format(item=fault.item) for text in _NUMERICS[status])
+    item = str(fault.item) if status in _UNNAMED else bodies[fault.item]
+    subject, expected, found, repair = (text.format(item=item) for text in _NUMERICS[status])
     raise SimulationError(
         f"{subject}: expected {expected}; got {found}, {fault.time:.9g} s into the step. {repair}."
     )

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 import enum
 import struct
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -83,14 +84,19 @@ class Multibody:
         state_size: length of a state: q, v, and the substep [s] that dopri5 would take next (0 = unknown).
     """
 
-    def __init__(self, tables: Tables) -> None:
+    def __init__(self, tables: Tables, bodies: Sequence[str] = ()) -> None:
         """Build the mechanism.
+
+        Args:
+            tables: the mechanism.
+            bodies: names of the bodies, for errors; their numbers if not given.
 
         Raises:
             MechanismError: a table has a wrong shape or a wrong value.
         """
         arrays = contiguous(tables)
         self.tables = tables
+        self._names = [f'"{name}"' for name in bodies] or [str(i) for i in range(len(tables.parent))]
         self.n, self.nq, self.nv = len(tables.parent), len(tables.rest), len(tables.stiffness)
         self.state_size = self.nq + self.nv + 1
         self._memory = np.zeros((_size(self.n, self.nq, self.nv) + 7) // 8)
@@ -183,7 +189,7 @@ class Multibody:
         status = _advance(self._model, self._step_at)
         if status:
             arguments = {"h": h, "nodes": nodes, "integrator": integrator, "substeps": substeps}
-            fail(status, self._fault, arguments | {"rtol, atol": (rtol, atol)})
+            fail(status, self._fault, self._names, arguments | {"rtol, atol": (rtol, atol)})
         return self._next.copy(), self._work.copy()
 
     def motion(self, state: Array, out: Motion) -> None:
@@ -208,7 +214,7 @@ class Multibody:
             *self._results_at, self._fault_at,
         )  # fmt: skip
         if status:
-            fail(status, self._fault, {})
+            fail(status, self._fault, self._names, {})
         result, nv, n = self._results.copy(), self.nv, self.n
         bodies = result[nv:].reshape(3, n, 6)
         return Evaluation(result[:nv], bodies[0], bodies[1], bodies[2])
@@ -231,7 +237,7 @@ class Multibody:
         """Evaluate the accelerations ``repeats`` times without wrench: the work that benchmarks time."""
         self._take(state)
         if status := _repeat(self._model, self._state_at, repeats):
-            fail(status, self._fault, {})
+            fail(status, self._fault, self._names, {})
 
     def _take(self, state: Array) -> None:
         if state.shape != self._state.shape:

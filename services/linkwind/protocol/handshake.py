@@ -92,7 +92,7 @@ class HandShake:
         if known is None:
             names = ", ".join(self.participants) or "none"
             raise RefusedError(f'participant "{hello.name}": expected one of {names}')
-        if known.instance and known.instance != hello.instance:
+        if known.ready and known.instance != hello.instance:
             raise RefusedError(f'a participant named "{hello.name}" already takes part in run {self.run}')
         if hello.schema_sha256 != SHA256:
             reason = (

@@ -8,8 +8,10 @@ the browser.
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
+from linkwind.errors import InputError
 from linkwind.report.data import read
 from linkwind.report.page import render
 
@@ -23,8 +25,17 @@ def write_report(log_path: Path, out: Path) -> None:
 
     Raises:
         LogError: the log is missing or not one of linkwind's.
+        InputError: the file cannot be written.
     """
-    out.write_text(render(read(log_path)), encoding="utf-8")
+    page = render(read(log_path))
+    partial = out.with_name(out.name + ".partial")
+    try:
+        partial.write_text(page, encoding="utf-8")
+        partial.replace(out)  # a page that is there stays whole until the new one is
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            partial.unlink(missing_ok=True)
+        raise InputError(f"{out}: cannot write the report: {error.strerror}. Choose another place") from error
 
 
 __all__ = ["write_report"]

@@ -10,18 +10,19 @@ from pathlib import Path
 from types import FrameType, MappingProxyType
 from typing import Any
 
-import numpy as np
-
+from linkwind import aero
 from linkwind.bus.base import DynamicsLink
 from linkwind.dynamics.recorder import Recorder, tables_sha256
 from linkwind.dynamics.service import DynamicsService, Result
-from linkwind.errors import LinkwindError
+from linkwind.errors import InputError, LinkwindError, ScenarioError
 from linkwind.log.writer import LogWriter
 from linkwind.mechanism import build
 from linkwind.native.library import library_sha256
 from linkwind.runs import folder as folders
 from linkwind.runs.children import children
 from linkwind.scenario import Scenario
+
+PORTS_TRIED = 5
 
 
 @dataclass(frozen=True)
@@ -33,12 +34,14 @@ class Outcome:
         result: what it came to.
         log: the MCAP file.
         report: the HTML page.
+        report_trouble: why there is no page; empty if there is one.
     """
 
     scenario: str
     result: Result
     log: Path
     report: Path
+    report_trouble: str = ""
 
     def as_json(self) -> dict[str, Any]:
         """Return the outcome with the keys of ``linkwind run --json``."""
@@ -49,14 +52,14 @@ class Outcome:
             "exchanges": result.exchanges,
             "wall_s": result.wall_s,
             "exchange_us": {
-                "median": float(np.median(result.exchange_us)),
-                "p99": float(np.percentile(result.exchange_us, 99)),
+                "median": result.exchange_us.quantile_us(0.5),
+                "p99": result.exchange_us.quantile_us(0.99),
             },
             "joint_gap_max_m": result.joint_gap_max_m,
             "force_max_N": result.force_max_N,
             "final_state_sha256": result.final_state_sha256,
             "log": str(self.log),
-            "report": str(self.report),
+            "report": None if self.report_trouble else str(self.report),
         }
 
 
@@ -80,21 +83,20 @@ def run(
     Raises:
         LinkwindError: the run ended early; its log and report tell as well.
     """
+    mechanism = build(scenario)
+    aero.check(scenario)
     folder = folders.create(scenario.name, out)
-    service = DynamicsService(scenario, build(scenario), folders.run_id(folder))
+    service = DynamicsService(scenario, mechanism, folders.run_id(folder))
     if scenario.bus.transport == "inprocess":
-        return _drive(scenario, service, folder, progress, lambda: _inprocess(service, files), lambda: None)
-    from linkwind.bus.zenoh import loopback_endpoint
-
+        return _drive(scenario, service, folder, progress, _inprocess(service, files), lambda: None)
+    link, endpoint = _listen_here(service, scenario)
     with children(folder) as providers:
-        endpoint = loopback_endpoint()
         for name in service.session.providers:
             arguments = ["aero", "--connect", endpoint, "--name", name, "--run", service.session.run]
             if name in files:
                 arguments += ["--force-fmu", str(files[name].resolve())]
             providers.start(name, [*arguments, "--start-timeout", str(scenario.bus.start_timeout)])
-        open_link = lambda: zenoh_link(service, scenario, [endpoint], [])  # noqa: E731
-        return _drive(scenario, service, folder, progress, open_link, providers.check)
+        return _drive(scenario, service, folder, progress, link, providers.check)
 
 
 def dynamics(
@@ -106,11 +108,26 @@ def dynamics(
     listen: Sequence[str],
     connect: Sequence[str],
 ) -> Outcome:
-    """Run the dynamics alone; the providers come from elsewhere. See :func:`run`."""
+    """Run the dynamics alone; the providers come from elsewhere. See :func:`run`.
+
+    Raises:
+        ScenarioError: the scenario wants everything in one process.
+    """
+    if scenario.bus.transport == "inprocess":
+        raise ScenarioError(
+            f'{scenario.source}: bus.transport: expected "zenoh", to meet providers that are started '
+            'elsewhere; got "inprocess". Use: linkwind run'
+        )
+    mechanism = build(scenario)
+    aero.check(scenario)
     folder = folders.create(scenario.name, out)
-    service = DynamicsService(scenario, build(scenario), run_id or folders.run_id(folder))
-    open_link = lambda: zenoh_link(service, scenario, listen, connect)  # noqa: E731
-    return _drive(scenario, service, folder, progress, open_link, lambda: None)
+    service = DynamicsService(scenario, mechanism, run_id or folders.run_id(folder))
+    try:
+        link = zenoh_link(service, scenario, listen, connect)
+    except InputError:
+        folder.rmdir()
+        raise
+    return _drive(scenario, service, folder, progress, link, lambda: None)
 
 
 def _drive(
@@ -118,29 +135,45 @@ def _drive(
     service: DynamicsService,
     folder: Path,
     progress: Progress,
-    open_link: Callable[[], DynamicsLink],
+    link: DynamicsLink,
     poll: Callable[[], None],
 ) -> Outcome:
     """Run the service, close the log with how it ended, write the report either way."""
-    from linkwind.report import write_report
-
     log, report = folder / "log.mcap", folder / "report.html"
     try:
-        with (
-            terminate_as_interrupt(),
-            _open_log(log, scenario, service) as writer,
-            closing(open_link()) as link,
-        ):
+        with terminate_as_interrupt(), closing(link), _open_log(log, scenario, service) as writer:
             recorder = Recorder(writer, scenario, service.mechanism, service.multibody)
             result = service.run(link, recorder, progress, poll)
             writer.close(final_state_sha256=result.final_state_sha256)
     except LinkwindError as error:
-        if log.exists():
-            write_report(log, report)
-            raise type(error)(f"{error}\nlog: {log}\nreport: {report}") from error
-        raise
-    write_report(log, report)
-    return Outcome(scenario.name, result, log, report)
+        if not log.exists():
+            raise
+        raise type(error)(f"{error}\nlog: {log}\nreport: {_report(log, report) or report}") from error
+    return Outcome(scenario.name, result, log, report, _report(log, report))
+
+
+def _report(log: Path, report: Path) -> str:
+    """Write the report; return what went wrong, which must not hide how the run went."""
+    from linkwind.report import write_report
+
+    try:
+        write_report(log, report)
+    except LinkwindError as error:
+        return str(error)
+    return ""
+
+
+def _listen_here(service: DynamicsService, scenario: Scenario) -> tuple[DynamicsLink, str]:
+    """Open the dynamics' end on a free port of this machine; return it and its endpoint."""
+    from linkwind.bus.zenoh import loopback_endpoint
+
+    for _ in range(PORTS_TRIED):
+        endpoint = loopback_endpoint()
+        try:
+            return zenoh_link(service, scenario, [endpoint], []), endpoint
+        except InputError as error:  # somebody took the port between asking and listening
+            taken = error
+    raise taken
 
 
 def _open_log(path: Path, scenario: Scenario, service: DynamicsService) -> LogWriter:

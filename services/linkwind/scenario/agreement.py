@@ -103,6 +103,14 @@ def _cycle(body: str, parents: dict[str, str]) -> list[str]:
 
 
 def _provider(scenario: Scenario, provider: Provider, path: Path) -> Iterator[Problem]:
+    if provider.name == "dynamics":
+        expected = "a name that no other participant has"
+        yield Problem((*path, "name"), expected, show(provider.name), 'Choose another, such as "aero".')
+    yield from _provider_bodies(scenario, provider, path)
+    yield from _provider_model(scenario, provider, path)
+
+
+def _provider_bodies(scenario: Scenario, provider: Provider, path: Path) -> Iterator[Problem]:
     bodies = [body.name for body in scenario.bodies]
     for index, name in enumerate(provider.bodies):
         if name not in bodies:
@@ -113,6 +121,9 @@ def _provider(scenario: Scenario, provider: Provider, path: Path) -> Iterator[Pr
     for name in provider.field:
         if name not in provider.bodies:
             yield choice((*path, "field", name), "one of its bodies", provider.bodies, name)
+
+
+def _provider_model(scenario: Scenario, provider: Provider, path: Path) -> Iterator[Problem]:
     if provider.model == "field" and not provider.field:
         expected = "a table for at least one body"
         advice = f'Add a table for a body, such as {_first(provider.bodies)}, with fx = "…".'

@@ -45,7 +45,7 @@ def load(source: str | Path, overrides: Sequence[str] = ()) -> Scenario:
         return loads(text, f"{source}.toml", overrides)
     path = Path(source)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise ScenarioError(
             f"{path}: expected text in UTF-8; got a wrong byte at position {error.start}. Save it as UTF-8."
@@ -70,7 +70,9 @@ def loads(text: str, name: str, overrides: Sequence[str] = ()) -> Scenario:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise ScenarioError(f"{name}: expected valid TOML; got: {_flat(error)}. Correct it.") from None
-    return _scenario(data, name, overrides)
+    scenario = _scenario(data, name, overrides)
+    scenario.called(name)
+    return scenario
 
 
 def from_json(text: str, name: str = "scenario.json") -> Scenario:

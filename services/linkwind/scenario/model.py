@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
 from linkwind.scenario.agreement import disagreements
 from linkwind.scenario.bodies import Body, Joint
@@ -36,6 +36,8 @@ class Scenario(Section):
     coupling: Coupling = Field(default=Coupling(), description="When motion and wrench are exchanged")
     bus: Bus = Field(default=Bus(), description="How messages travel")
 
+    _source: str = PrivateAttr(default="")
+
     @field_validator("providers")
     @classmethod
     def _all_bodies_by_default(
@@ -53,6 +55,22 @@ class Scenario(Section):
         if problems:
             raise ProblemError(problems)
         return self
+
+    @property
+    def source(self) -> str:
+        """What errors call the scenario: the file as the user gave it, where that is known."""
+        return self._source or f"{self.name}.toml"
+
+    def called(self, source: str) -> None:
+        """Remember the file that the scenario came from; it is no part of the scenario itself."""
+        self._source = source
+
+    def __eq__(self, other: object) -> bool:
+        """Compare what the scenarios say, not where they came from."""
+        return isinstance(other, Scenario) and self.to_json() == other.to_json()
+
+    def __hash__(self) -> int:
+        return hash(self.to_json())
 
     @property
     def end_ns(self) -> int:
