@@ -12,6 +12,8 @@ size_t lw_part_known(void);
 size_t lw_part_values(void);
 /* Index of the first value of a section. */
 uint32_t lw_part_first(const lw_instance *, unsigned section);
+/* Index of the first input: parameters lie before it. */
+uint32_t lw_part_inputs(const lw_instance *);
 /* The continuous states, and their derivatives in the same order: first value, and their groups. */
 uint32_t lw_part_states(const lw_instance *);
 uint32_t lw_part_derivatives(const lw_instance *, unsigned *groups);

@@ -74,6 +74,8 @@ uint32_t lw_part_first(const lw_instance *instance, unsigned section) {
     return instance->part->first[section];
 }
 
+uint32_t lw_part_inputs(const lw_instance *instance) { return FIRST(POSITION); }
+
 uint32_t lw_part_states(const lw_instance *instance) { return (void)instance, 0; }
 
 uint32_t lw_part_derivatives(const lw_instance *instance, unsigned *groups) {

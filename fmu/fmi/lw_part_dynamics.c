@@ -71,6 +71,8 @@ uint32_t lw_part_first(const lw_instance *instance, unsigned section) {
     return instance->part->first[section];
 }
 
+uint32_t lw_part_inputs(const lw_instance *instance) { return FIRST(FORCE); }
+
 uint32_t lw_part_states(const lw_instance *instance) { return FIRST(Q); }
 
 uint32_t lw_part_derivatives(const lw_instance *instance, unsigned *groups) {

@@ -70,13 +70,17 @@ int lw_get_snapshot(lw_instance *instance, void **handle) {
 int lw_set_snapshot(lw_instance *instance, void *handle) {
     lw_snapshot *snapshot = known(instance, handle);
     if (!snapshot) return LW_FMI_ERROR;
-    const double *data = snapshot->data;
+    const double *data = snapshot->data, *known_values = data + HEAD + lw_part_memory();
+    size_t parameters = lw_part_inputs(instance) * sizeof(double);
+    instance->unconfigured |= memcmp(instance->values, known_values, parameters) != 0;
     instance->mode = (unsigned)data[MODE];
     instance->time = data[TIME];
     instance->stop = data[STOPS] != 0.0 ? data[STOP] : HUGE_VAL;
-    for (int i = 0; i < LW_INTEGERS; ++i) instance->integers[i] = (int32_t)data[INTEGERS + i];
+    for (int i = 0; i < LW_INTEGERS; ++i) {
+        instance->unconfigured |= instance->integers[i] != (int32_t)data[INTEGERS + i];
+        instance->integers[i] = (int32_t)data[INTEGERS + i];
+    }
     memcpy(instance->store, data + HEAD, instance->state_count * sizeof(double));
-    instance->unconfigured = 1;
     instance->stale = LW_STALE_ALL;
     return LW_FMI_OK;
 }
