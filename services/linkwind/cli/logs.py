@@ -1,26 +1,33 @@
-"""``linkwind log …``: what is in a log."""
+"""``linkwind log …``: what is in a log, a clean file from a damaged one, tables for other tools."""
 
 from __future__ import annotations
 
 import json
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from linkwind.cli.options import JsonOption
+from linkwind.cli.options import JsonOption, LogArgument
+
+
+class Format(StrEnum):
+    """Kind of files to export."""
+
+    CSV = "csv"
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    group = typer.Typer(help="Look into a log.", no_args_is_help=True)
+    group = typer.Typer(help="Look into a log, recover or export it.", no_args_is_help=True)
     group.command()(info)
+    group.command()(recover)
+    group.command()(export)
     app.add_typer(group, name="log")
 
 
-def info(
-    log: Annotated[Path, typer.Argument(help="The MCAP log of a run.")], as_json: JsonOption = False
-) -> None:
+def info(log: LogArgument, as_json: JsonOption = False) -> None:
     """Print what a log holds: topics, messages, steps, whether it is complete, versions.
 
     Example: linkwind log info runs/two_link-20260101-120000/log.mcap
@@ -47,3 +54,47 @@ def info(
     }
     for name, value in rows.items():
         typer.echo(f"{name:>20}  {value}")
+
+
+def recover(
+    log: LogArgument,
+    out: Annotated[Path, typer.Option("--out", "-o", help="The clean file; it must not exist.")],
+    as_json: JsonOption = False,
+) -> None:
+    """Write a clean log from one that was cut or damaged, with all that can be trusted.
+
+    Example: linkwind log recover runs/two_link-20260101-120000/log.mcap -o recovered.mcap
+    """
+    from rich.console import Console
+
+    from linkwind.log.recover import recover as recover_log
+
+    if as_json:
+        done = recover_log(log, out)
+        summary = {"messages_recovered": done.messages, "bytes_lost": done.bytes_lost, "file": str(done.file)}
+        typer.echo(json.dumps(summary))
+        return
+    with Console(stderr=True).status("recovering") as status:
+        done = recover_log(log, out, lambda messages: status.update(f"recovering: {messages} messages"))
+    typer.echo(f"wrote {done.file}: {done.messages} messages, {done.bytes_lost} bytes were lost")
+    typer.echo(f"note: {done.damage}" if done.damage else "note: nothing was missing from the log")
+
+
+def export(
+    log: LogArgument,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the files.")],
+    format_: Annotated[Format, typer.Option("--format", help="Kind of files.")] = Format.CSV,
+) -> None:
+    """Write trajectory, steps and wrenches of a log as tables.
+
+    Example: linkwind log export runs/two_link-20260101-120000/log.mcap -o tables --format csv
+    """
+    from linkwind.log.export import export_csv
+    from linkwind.log.reader import open_log
+
+    opened = open_log(log)
+    if not opened.complete:
+        reason = opened.damage.text if opened.damage else opened.error
+        typer.echo(f"note: the log is not complete: {reason or 'the run was cut off'}", err=True)
+    for path in export_csv(opened, out):
+        typer.echo(f"wrote {path}")

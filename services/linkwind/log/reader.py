@@ -78,6 +78,7 @@ class Log:
         channels: by number, as in :meth:`messages`.
         metadata: run id, schema hash and what the writer was given besides.
         versions: of the programs that made the log, and the processor.
+        ending: how the run ended, as it was recorded; empty if the writer was killed.
     """
 
     def __init__(self, path: Path, data: Data) -> None:
@@ -91,7 +92,7 @@ class Log:
         self._check_schemas()
         self.metadata: dict[str, str] = self._contents.metadata.get(contents.RUN, {})
         self.versions: dict[str, str] = self._contents.metadata.get(contents.VERSIONS, {})
-        self._end: dict[str, str] = self._contents.metadata.get(contents.END, {})
+        self.ending: dict[str, str] = self._contents.metadata.get(contents.END, {})
 
     def _check_origin(self) -> None:
         profile = self._contents.profile
@@ -143,6 +144,11 @@ class Log:
         return self._known(self.metadata.get("run"), "the run id")
 
     @property
+    def has_scenario(self) -> bool:
+        """Whether the scenario can be read."""
+        return contents.SCENARIO in self._contents.attachments
+
+    @property
     def scenario_json(self) -> str:
         """The resolved scenario."""
         scenario = self._contents.attachments.get(contents.SCENARIO)
@@ -170,23 +176,23 @@ class Log:
     @property
     def complete(self) -> bool:
         """Whether the run came to its end and every message of it can be read."""
-        return self.damage is None and self._end.get("complete") == "true"
+        return self.damage is None and self.ending.get("complete") == "true"
 
     @property
     def error(self) -> str | None:
         """What ended the run early: class and text; None if nothing did or the writer was killed."""
-        return f"{self._end['error']}: {self._end['text']}" if "error" in self._end else None
+        return f"{self.ending['error']}: {self.ending['text']}" if "error" in self.ending else None
 
     @property
     def final_state_sha256(self) -> str | None:
         """Of the last accepted state; None for a run without an end."""
-        return self._end.get("final_state_sha256")
+        return self.ending.get("final_state_sha256")
 
     @property
     def steps(self) -> int:
         """Communication steps of the run; of a cut log, those that can be read."""
-        if "steps" in self._end:
-            return int(self._end["steps"])
+        if "steps" in self.ending:
+            return int(self.ending["steps"])
         payloads = [message.payload for message in self.raw(contents.STATE)]
         if not payloads:
             return 0

@@ -1,0 +1,104 @@
+"""A log as CSV files, for tools that read no MCAP: every number as the shortest text that gives its bits."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwind.errors import LogError
+from linkwind.log import contents, tables
+from linkwind.log.difference import WIDTHS
+from linkwind.log.reader import Log
+
+BLOCK = 4096  # messages in memory at a time
+
+XYZ = ("x", "y", "z")
+SIX = ("x", "y", "z", "rx", "ry", "rz")  # linear part, angular part
+COMPONENTS = {
+    "position": XYZ, "orientation": ("w", "x", "y", "z"), "linear": XYZ, "angular": XYZ, "acceleration": SIX,
+    "reaction": SIX, "wrench": SIX, "force": XYZ, "torque": XYZ,
+    "added_inertia": tuple(f"{row}{column}" for row in range(6) for column in range(6)),
+}  # fmt: skip
+UNITS: dict[str, Sequence[str]] = {
+    "position": ["m"] * 3, "linear": ["m/s"] * 3, "angular": ["rad/s"] * 3, "force": ["N"] * 3,
+    "torque": ["N m"] * 3, "acceleration": ["m/s^2"] * 3 + ["rad/s^2"] * 3,
+    "reaction": ["N"] * 3 + ["N m"] * 3, "wrench": ["N"] * 3 + ["N m"] * 3,
+    "kinetic_energy": ["J"], "potential_energy": ["J"], "external_work": ["J"], "dissipated_work": ["J"],
+    "joint_gap": ["m"], "residual": ["J^0.5"], "interface_energy": ["J"],
+}  # fmt: skip
+
+
+def export_csv(log: Log, folder: Path) -> list[Path]:
+    """Write ``trajectory.csv``, ``steps.csv`` and ``wrench_PROVIDER.csv`` of what can be read.
+
+    Args:
+        log: to read.
+        folder: for the files; is made if it is not there.
+
+    Returns:
+        the files, one for each topic that has a message.
+
+    Raises:
+        LogError: a file exists or cannot be written, or the log has no messages.
+    """
+    wrenches = {f"{contents.WRENCH}{name}": f"wrench_{name}" for name in log.provider_bodies}
+    names = {contents.STATE: "trajectory", contents.STEP: "steps"} | wrenches
+    written = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for topic, name in names.items():
+            if log.topics.get(topic):
+                path = folder / f"{name}.csv"
+                with path.open("x", newline="", encoding="utf-8") as file:
+                    _write(log, topic, csv.writer(file))
+                written.append(path)
+    except OSError as error:
+        raise LogError(
+            f"{error.filename}: expected to make a new file; got {error.strerror}. Choose another -o."
+        ) from error
+    if not written:
+        raise LogError(f"{log.path}: expected messages to export; got none. The run ended before its first.")
+    return written
+
+
+def _write(log: Log, topic: str, writer: Any) -> None:
+    name = str(contents.message_name(topic))
+    bodies = log.provider_bodies.get(topic.removeprefix(contents.WRENCH), log.bodies)
+    payloads = (message.payload for message in log.raw(topic))
+    head: list[str] = []
+    while block := list(islice(payloads, BLOCK)):
+        columns = tables.columns(block, name, f"{log.path}: {topic}")
+        t = tables.seconds(columns.pop("time_ns"))
+        if not head:
+            head = [label for field, values in columns.items() for label in _labels(field, values, bodies)]
+            head.insert(1, "t [s]")
+            writer.writerow(head)
+        step, *others = columns.values()
+        writer.writerows(_rows([step, t, *others]))
+
+
+def _rows(columns: Sequence[NDArray[Any]]) -> Iterator[list[float | int]]:
+    """Yield the values of each message in one list."""
+    for parts in zip(*(np.asarray(column).tolist() for column in columns), strict=True):
+        yield [value for part in parts for value in part]
+
+
+def _labels(field: str, values: NDArray[Any], bodies: Sequence[str]) -> Iterator[str]:
+    """Yield the title of each column of a field: body, quantity, component, unit."""
+    leaf, width = field.rsplit(".", 1)[-1], values.shape[1]
+    per_body = leaf in WIDTHS and width == WIDTHS[leaf] * len(bodies)
+    for place in range(width):
+        if per_body:
+            body, component = divmod(place, WIDTHS[leaf])
+            title = f"{bodies[body]}.{leaf}.{COMPONENTS[leaf][component]}"
+        else:
+            component = 0
+            title = leaf if width == 1 else f"{leaf}.{place}"
+        units = UNITS.get(leaf)
+        yield f"{title} [{units[component]}]" if units else title

@@ -1,0 +1,71 @@
+"""Tables of a log: every number comes back with its bits."""
+
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from linkwind.cli import app
+from linkwind.errors import LogError
+from linkwind.log import export
+from linkwind.log.reader import open_log
+from tests.log.sample import NAMES, new_writer, record
+
+POINTS = 20
+
+
+def read(path):
+    with path.open(newline="", encoding="utf-8") as file:
+        head, *rows = csv.reader(file)
+    return {name: np.array([float(row[i]) for row in rows]) for i, name in enumerate(head)}
+
+
+def test_every_number_comes_back(tmp_path, monkeypatch):
+    monkeypatch.setattr(export, "BLOCK", 7)  # not a divisor of the number of messages
+    states, _ = record(tmp_path / "log.mcap", POINTS)
+    files = export.export_csv(open_log(tmp_path / "log.mcap"), tmp_path / "tables")
+    assert [file.name for file in files] == ["trajectory.csv", "steps.csv", "wrench_aero.csv"]
+    trajectory, steps, wrench = map(read, files)
+    assert trajectory["step"].tolist() == list(range(POINTS))
+    assert trajectory["t [s]"].tolist() == [k * 1_000_000 / 1e9 for k in range(POINTS)]
+    for k, state in enumerate(states):
+        for b, body in enumerate(NAMES):
+            for i, axis in enumerate("xyz"):
+                assert trajectory[f"{body}.position.{axis} [m]"][k] == state.motion.position[b, i]
+                assert trajectory[f"{body}.angular.{axis} [rad/s]"][k] == state.motion.angular[b, i]
+                assert trajectory[f"{body}.wrench.r{axis} [N m]"][k] == state.arrays["wrench"][b, 3 + i]
+            for i, axis in enumerate("wxyz"):
+                assert trajectory[f"{body}.orientation.{axis}"][k] == state.motion.orientation[b, i]
+        assert trajectory["q.4"][k] == state.arrays["q"][4]
+        assert trajectory["joint_gap [m]"][k] == state.scalars["joint_gap"]
+        assert wrench["link2.force.y [N]"][k] == state.wrench.force[1, 1]
+        assert wrench["link1.torque.z [N m]"][k] == state.wrench.torque[0, 2]
+        assert steps["interface_energy [J]"][k] == -0.25 * k
+        assert steps["extrapolation_error.0"][k] == 0.5 * k
+        assert np.isnan(steps["extrapolation_error.3"][k])
+    assert "ball.force.x [N]" not in wrench  # the provider does not act on it
+
+
+def test_nothing_is_written_over_and_nothing_from_nothing(tmp_path):
+    record(tmp_path / "log.mcap", 2)
+    log = open_log(tmp_path / "log.mcap")
+    export.export_csv(log, tmp_path / "tables")
+    with pytest.raises(LogError, match=r"trajectory\.csv: expected to make a new file"):
+        export.export_csv(log, tmp_path / "tables")
+    new_writer(tmp_path / "empty.mcap").close()
+    with pytest.raises(LogError, match="expected messages to export"):
+        export.export_csv(open_log(tmp_path / "empty.mcap"), tmp_path / "none")
+
+
+def test_command_says_what_is_missing(tmp_path):
+    record(tmp_path / "log.mcap", 20, flush_every=4)
+    data = (tmp_path / "log.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(data[: len(data) // 2])
+    done = CliRunner().invoke(app, ["log", "export", str(tmp_path / "cut.mcap"), "-o", str(tmp_path / "t")])
+    assert done.exit_code == 0
+    assert "note: the log is not complete" in done.stderr
+    rows = read(tmp_path / "t" / "trajectory.csv")["step"]
+    assert 0 < len(rows) == open_log(tmp_path / "cut.mcap").topics["/state"] < 20
