@@ -13,8 +13,8 @@ static int check_step(const lw_instance *instance, double point, double size) {
         return lw_report(instance, LW_FMI_ERROR, "Expected currentCommunicationPoint = %.17g but was %.17g.",
                          instance->time, point);
     if (!(point + size > point))
-        return lw_report(instance, LW_FMI_ERROR, "Expected communicationStepSize to advance the time %.17g but "
-                         "was %.17g.", point, size);
+        return lw_report(instance, LW_FMI_ERROR,
+                         "Expected communicationStepSize to advance the time %.17g but was %.17g.", point, size);
     if (point + size > instance->stop + slack)
         return lw_report(instance, LW_FMI_ERROR,
                          "Expected a step that ends by stopTime = %.17g but was %.17g.", instance->stop,
