@@ -181,16 +181,18 @@ static int accept(lw_run *run, double time) {
     return status;
 }
 
+enum { LW_MAX_SUBSTEPS = 1000000 }; /* of dopri5 in a macro step: a run shall end, if with an error */
+
 static int dormand_prince(lw_run *run) {
     lw_multibody *mb = run->mb;
     double time = 0.0, h = run->step->h, limit = run->step->h / run->step->substeps, largest = 5.0;
     double next = run->proposed > 0.0 ? fmin(run->proposed, limit) : limit;
     int trouble = LW_OK, status = derive(run, 0.0, mb->y, mb->rate[0]);
     if (run->proposed <= 0.0) run->proposed = next;
-    while (!status && time < h) {
+    for (int tried = 0; !status && time < h; ++tried) {
         int last = time + 1.01 * next >= h;
         double step = last ? h - time : next;
-        if (step < 1e-13 * h) {
+        if (step < 1e-13 * h || tried == LW_MAX_SUBSTEPS) {
             run->step->fault->time = time;
             return trouble ? trouble : LW_STEP_UNDERFLOW;
         }

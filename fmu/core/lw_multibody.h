@@ -44,7 +44,7 @@ typedef enum {
     /* numerical trouble */
     LW_SINGULAR,             /* item: body whose joint has no inertia to move */
     LW_NOT_FINITE,           /* item: body whose coordinates overflowed */
-    LW_STEP_UNDERFLOW,       /* the error control asks for steps of nothing */
+    LW_STEP_UNDERFLOW,       /* the error control asks for steps of nothing, or a million */
     LW_WRENCH_NOT_FINITE,    /* item: body */
     LW_ADDED_NOT_FINITE,     /* item: body */
     LW_STATE_NOT_FINITE,     /* item: index in the state */
