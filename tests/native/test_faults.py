@@ -163,5 +163,5 @@ def test_dopri5_gives_up_rather_than_run_for_ever():
     stiff = Multibody(tables([Body(-1, "prismatic", 1.0, stiffness=1e14)]))
     state = stiff.initial_state([1.0], [0.0])
     options = {"integrator": Integrator.DOPRI5, "rtol": 1e-3, "atol": 1e-6}
-    with pytest.raises(SimulationError, match="dopri5: .*or a million of them"):
+    with pytest.raises(SimulationError, match=r"dopri5: .*or a million of them"):
         stiff.advance(state, 10.0, NODES, np.zeros((1, 1, 6)), None, **options)
