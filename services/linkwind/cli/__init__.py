@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from linkwind.cli import fmu, logs, report, run, scenario, services, verify
+from linkwind.cli import fmu, logs, replay, report, run, scenario, services, verify
 from linkwind.errors import LinkwindError
 
 app = typer.Typer(
@@ -23,6 +23,7 @@ scenario.register(app)
 report.register(app)
 logs.register(app)
 verify.register(app)
+replay.register(app)
 fmu.register(app)
 
 

@@ -4,8 +4,8 @@ Each side takes bytes and gives bytes; ``bus/`` moves them. The protocol itself 
 ``schemas/README.md``, so that a stranger can implement a participant from it.
 """
 
-from linkwind.protocol.control import fault, fault_error
+from linkwind.protocol.control import fault, fault_error, refuse
 from linkwind.protocol.dynamics import DynamicsSession
 from linkwind.protocol.provider import Model, ProviderSession, ProviderState
 
-__all__ = ["DynamicsSession", "Model", "ProviderSession", "ProviderState", "fault", "fault_error"]
+__all__ = ["DynamicsSession", "Model", "ProviderSession", "ProviderState", "fault", "fault_error", "refuse"]

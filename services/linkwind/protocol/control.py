@@ -23,6 +23,11 @@ def fault(participant: str, step: int, iteration: int, error: BaseException) -> 
     return bytes(Control(fault=body).SerializeToString())
 
 
+def refuse(reason: str) -> bytes:
+    """Return the answer to somebody who may not take part."""
+    return bytes(Control(refuse={"reason": reason}).SerializeToString())
+
+
 def fault_error(payload: bytes) -> FaultError:
     """Return a received Fault message as an exception."""
     message = parse(payload, "fault")

@@ -1,0 +1,91 @@
+"""``linkwind replay``: a log on the bus again."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from linkwind.cli.options import ConnectOption, JsonOption, ListenOption, LogArgument
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from linkwind.log.reader import Log
+    from linkwind.runs.replay import Replayed
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(replay)
+
+
+def replay(
+    log: LogArgument,
+    rate: Annotated[
+        float, typer.Option(min=0.0, help="Times as fast as in reality; 0 for as fast as possible.")
+    ] = 1.0,
+    start: Annotated[float | None, typer.Option(help="Begin at this simulation time [s].")] = None,
+    end: Annotated[float | None, typer.Option(help="End at this simulation time [s].")] = None,
+    topics: Annotated[
+        list[str] | None,
+        typer.Option(metavar="TOPIC", help="Only this topic, such as /motion or /wrench/aero; repeatable."),
+    ] = None,
+    loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end, until Ctrl-C.")] = False,
+    listen: ListenOption = None,
+    connect: ConnectOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Publish the messages of a log as the run did, once somebody subscribes.
+
+    Example: linkwind replay runs/two_link-20260101-120000/log.mcap --rate 0.5 --listen tcp/0.0.0.0:7447
+    """
+    from linkwind.cli.run import DEFAULT_ENDPOINT
+    from linkwind.log.reader import open_log
+    from linkwind.runs.replay import Selection
+    from linkwind.runs.replay import replay as replay_log
+    from linkwind.runs.run import terminate_as_interrupt
+
+    opened = open_log(log)
+    selection = Selection(rate, start, end, tuple(topics or ()), loop)
+    ends = {"listen": listen or ([] if connect else [DEFAULT_ENDPOINT]), "connect": connect or []}
+
+    def job(progress: Callable[[float], None]) -> Replayed:
+        return replay_log(opened, selection, **ends, progress=progress)
+
+    with terminate_as_interrupt():
+        if opened.damage is not None:
+            typer.echo(f"note: the log is not complete: {opened.damage.text}", err=True)
+        if as_json:
+            done = job(lambda t: None)
+        else:
+            where = ", ".join([*ends["listen"], *ends["connect"]])
+            typer.echo(f"waiting at {where} for a subscriber of linkwind/v1/{opened.run}/**")
+            done = _behind_a_bar(opened, selection.start or 0.0, end, job)
+    if not done.heard:
+        typer.echo("note: at the end nobody listened any more", err=True)
+    if as_json:
+        typer.echo(json.dumps(done.as_json()))
+    else:
+        late = (
+            "" if done.late_ms is None else "; late by {:.2f} ms median, {:.2f} ms p99".format(*done.late_ms)
+        )
+        typer.echo(f"{done.messages} messages in {done.wall_s:.2f} s{late}")
+
+
+def _behind_a_bar(
+    log: Log, start: float, end: float | None, job: Callable[[Callable[[float], None]], Replayed]
+) -> Replayed:
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from linkwind.scenario import from_json
+
+    total = end if end is not None else from_json(log.scenario_json).time.end
+    shown = TextColumn("{task.completed:.2f} of {task.total:.2f} s")
+    columns = (TextColumn("{task.description}"), BarColumn(), shown, TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(log.run, total=total)
+        bar.update(task, completed=start)
+        return job(lambda t: bar.update(task, completed=t))
