@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import logging
+import time
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from linkwind.cli.options import ConnectOption, ListenOption
+from linkwind.errors import LinkwindError
+
+PAUSE = (
+    1.0  # s between two runs of a provider that stays, in which the dynamics of the last one leaves the bus
+)
 
 
 def register(app: typer.Typer) -> None:
@@ -24,20 +30,45 @@ def aero(
     force_fmu: Annotated[
         Path | None, typer.Option(help="The FMU, for a provider whose model is fmu; its path stays here.")
     ] = None,
-    start_timeout: Annotated[float, typer.Option(help="Wait this long for the dynamics [s].")] = 60.0,
+    start_timeout: Annotated[
+        float, typer.Option(min=0.0, help="Wait this long for the dynamics [s].")
+    ] = 60.0,
+    stay: Annotated[
+        bool, typer.Option("--stay", help="Serve one run after the other, until told to stop.")
+    ] = False,
 ) -> None:
     """Start one force provider; it takes the scenario from the dynamics.
 
     Example: linkwind aero --connect tcp/10.0.0.2:7447
     """
-    from linkwind.aero.service import serve, session
-    from linkwind.bus.zenoh import ZenohProviderLink
     from linkwind.cli.run import DEFAULT_ENDPOINT
+    from linkwind.runs.run import terminate_as_interrupt
 
     if not connect and not listen:
         connect = [DEFAULT_ENDPOINT]
     logging.basicConfig(level=logging.INFO, format="%(message)s")
-    link = ZenohProviderLink(connect or [], listen or [], run)
+    endpoints = (connect or [], listen or [])
+    with terminate_as_interrupt():
+        while True:
+            try:
+                _serve(endpoints, run, name, force_fmu, start_timeout)
+            except LinkwindError as error:
+                if not stay:
+                    raise
+                logging.error("error: %s", error)
+            if not stay:
+                return
+            time.sleep(PAUSE)
+
+
+def _serve(
+    endpoints: tuple[list[str], list[str]], run: str, name: str, force_fmu: Path | None, start_timeout: float
+) -> None:
+    """Take part in one run."""
+    from linkwind.aero.service import serve, session
+    from linkwind.bus.zenoh import ZenohProviderLink
+
+    link = ZenohProviderLink(*endpoints, run)
     try:
         serve(link, session(name, force_fmu), start_timeout)
     finally:

@@ -1,0 +1,118 @@
+"""Docker as the tests use it: commands, and one compose project after the other."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import time
+import uuid
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+IMAGE = "linkwind-under-test"
+PATIENCE = 120.0  # s for a machine under load
+# Not by chance: these build an image, which takes minutes, and need Docker. tests/docker/run.sh has it all.
+REASON = "" if "LINKWIND_TEST_DOCKER" in os.environ else "builds an image: run tests/docker/run.sh"
+NOBODY = 4321  # a user that neither this machine nor the image knows
+
+
+def docker(*arguments: str) -> str:
+    """Return what a docker command prints, without its last line break."""
+    done = subprocess.run(
+        ["docker", *arguments], capture_output=True, text=True, timeout=PATIENCE, check=False
+    )
+    assert done.returncode == 0, f"docker {' '.join(arguments)}\n{done.stdout}{done.stderr}"
+    return done.stdout.strip()
+
+
+class Project:
+    """One compose project: its containers, its network, its folders."""
+
+    def __init__(self, folder: Path, image: str) -> None:
+        self.name = f"lw{uuid.uuid4().hex[:8]}"
+        self.folders = {name: folder / name for name in ("runs", "scenarios", "fmus")}
+        for path in self.folders.values():
+            path.mkdir(parents=True)
+            for above in (path, *path.parents[:3]):  # pytest makes its folders for its own user alone
+                above.chmod(0o755)
+        self._settings = {f"LINKWIND_{name.upper()}": str(path) for name, path in self.folders.items()}
+        self._settings["LINKWIND_IMAGE"] = image
+        self._started: list[subprocess.Popen[str]] = []
+
+    def start(self, *arguments: str, **settings: str) -> subprocess.Popen[str]:
+        """Start ``docker-compose ARGUMENTS`` with LINKWIND_… settings."""
+        given = {f"LINKWIND_{name}": value for name, value in settings.items()}
+        process = subprocess.Popen(
+            ["docker-compose", "-f", "docker/compose.yaml", "-p", self.name, "--ansi", "never", *arguments],
+            cwd=ROOT,
+            env=os.environ | self._settings | given,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        self._started.append(process)
+        return process
+
+    def do(self, *arguments: str, **settings: str) -> tuple[int, str]:
+        """Return exit status and output of ``docker-compose ARGUMENTS``."""
+        process = self.start(*arguments, **settings)
+        output, _ = process.communicate(timeout=PATIENCE)
+        return process.returncode, output
+
+    def up(self, *services: str, **settings: str) -> tuple[int, str]:
+        """Return status and output of a run, the way the README tells to do it."""
+        return self.do("up", "--exit-code-from", "dynamics", *services, **settings)
+
+    def container(self, service: str) -> str:
+        """Return the name of the container of a service."""
+        return f"{self.name}_{service}_1"
+
+    def folder(self) -> Path:
+        """Return the results of the only run."""
+        (folder,) = self.folders["runs"].iterdir()
+        return folder
+
+    def await_steps(self) -> None:
+        """Return as soon as the growing log shows that the run goes on."""
+        deadline = time.monotonic() + PATIENCE
+        while not any(log.stat().st_size > 1_000_000 for log in self.folders["runs"].glob("*/log.mcap")):
+            assert time.monotonic() < deadline, "the run did not get under way"
+            assert self._started[-1].poll() is None, self._started[-1].communicate()[0]
+            time.sleep(0.02)
+
+    def leftovers(self) -> list[str]:
+        """Return the containers and networks of the project that are still there."""
+        label = f"label=com.docker.compose.project={self.name}"
+        return (
+            docker("ps", "-aq", "--filter", label) + docker("network", "ls", "-q", "--filter", label)
+        ).split()
+
+    def end(self) -> None:
+        """Remove everything, whatever happened."""
+        for process in self._started:
+            if process.poll() is None:
+                process.kill()
+            process.communicate()
+        self.do("--profile", "force-fmu", "down", "--remove-orphans", "--timeout", "5")
+
+
+def linkwind(*arguments: str) -> str:
+    """Return what a linkwind command prints outside of any container."""
+    program = [sys.executable, "-m", "linkwind", *arguments]
+    done = subprocess.run(program, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def digest_outside(folder: Path, *arguments: str) -> str:
+    """Return the final state of a run outside of any container."""
+    return str(json.loads(linkwind("run", *arguments, "--out", str(folder), "--json"))["final_state_sha256"])
+
+
+def users(container: str) -> set[int]:
+    """Return the numbers of the users of a container's processes."""
+    numbers = re.findall(r"^\s*\d+\s+(\d+)", docker("top", container, "-o", "pid,uid"), re.MULTILINE)
+    return {int(number) for number in numbers}
