@@ -14,7 +14,7 @@ bundle=/etc/ssl/certs/ca-certificates.crt
 for given in "${PIP_CERT:-}" "${REQUESTS_CA_BUNDLE:-}" "${SSL_CERT_FILE:-}" $bundle; do
     if [ -f "$given" ]; then cp -L "$given" "$root$bundle"; break; fi
 done
-python3 - "$bundle" >"$root/etc/pip.conf" <<'PY'
+"${PYTHON:-python3}" - "$bundle" >"$root/etc/pip.conf" <<'PY'
 import ast, os, subprocess, sys
 
 settings = {"cert": sys.argv[1]}
