@@ -298,12 +298,32 @@ def test_command(log: Path, tmp_path: Path) -> None:
     assert "1 ULP" in done.stdout
 
 
-def test_the_file_of_a_force_fmu_is_asked_for(log: Path, tmp_path: Path) -> None:
-    fmu = rewrite(log, tmp_path / "a.mcap")
-    opened, scenario = scenario_of(fmu)
-    provider = scenario.providers[0].model_copy(update={"model": "fmu"})
-    with pytest.raises(InputError, match="expected the file of the FMU"):
-        verify(opened, scenario.model_copy(update={"providers": (provider,)}))
+def test_a_run_with_a_force_fmu_needs_its_file(tmp_path: Path) -> None:
+    from linkwind.fmi.export import export
+
+    runner, fmu, another = CliRunner(), tmp_path / "plate.fmu", tmp_path / "another.fmu"
+    export(load("two_link"), fmu, fmi="3", platforms=["host"], part="aero")
+    export(load("two_link_gust"), another, fmi="3", platforms=["host"], part="aero")
+    options = [
+        "--set=time.end=0.02",
+        "--set=bus.transport=inprocess",
+        "--out",
+        str(tmp_path / "out"),
+        "--json",
+    ]
+    done = runner.invoke(app, ["run", "two_link", "--force-fmu", str(fmu), *options])
+    assert done.exit_code == 0
+    path = str(tmp_path / "out" / "log.mcap")
+    done = runner.invoke(app, ["verify", path, "--force-fmu", str(fmu), "--json"])
+    assert json.loads(done.stdout) == {"identical": True, "steps": 20, "first_difference": None}
+    done = runner.invoke(app, ["verify", path])
+    assert isinstance(done.exception, InputError)
+    assert "expected the file of its FMU" in str(done.exception)
+    done = runner.invoke(app, ["verify", path, "--force-fmu", str(another)])
+    assert isinstance(done.exception, InputError)
+    assert "expected the FMU with SHA-256" in str(done.exception)
+    done = runner.invoke(app, ["verify", path, "--from-recorded-wrenches", "--json"])
+    assert json.loads(done.stdout)["identical"] is True
 
 
 @pytest.mark.parametrize(
