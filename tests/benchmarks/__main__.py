@@ -1,4 +1,4 @@
-"""All benchmarks, or those named: ``python -m tests.benchmarks [core log lockstep run memory]``."""
+"""All benchmarks, or those named: ``python -m tests.benchmarks [core log lockstep run memory verify …]``."""
 
 from __future__ import annotations
 
