@@ -35,7 +35,7 @@ def compiler() -> list[str]:
         if shutil.which(name):
             return [name]
     if importlib.util.find_spec("ziglang"):
-        return [sys.executable, "-m", "ziglang", "cc"]
+        return [sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline"]  # zig's default is this processor
     raise RuntimeError(
         "no C compiler found: expected $CC, cc, gcc, clang or the ziglang wheel (pip install ziglang)"
     )
