@@ -169,6 +169,16 @@ def test_a_number_that_is_none_is_a_difference(log: Path, tmp_path: Path) -> Non
     assert json.loads(done.stdout, parse_constant=pytest.fail)["first_difference"]["again"] == "nan"
 
 
+def test_what_one_run_exchanges_and_the_other_does_not(log: Path, tmp_path: Path) -> None:
+    """Vacuum has no added inertia: numbers that only one side has are a difference, not left out."""
+    found = diff(log, fly(tmp_path / "out", "aero.model=none"))
+    sizes = [f.first for f in found.fields if f.field == "added_inertia"]
+    assert [(first.topic, first.step) for first in sizes] == [("/wrench/aero", 0)]
+    assert (sizes[0].recorded, sizes[0].again) == ("72 values", "0 values")
+    assert not diff(log, fly(tmp_path / "b", "coupling.order=2")).identical
+    json.dumps(found.as_json(), allow_nan=False)
+
+
 def test_command(log: Path, tmp_path: Path) -> None:
     runner = CliRunner()
     done = runner.invoke(app, ["diff", str(log), str(log), "--json"])

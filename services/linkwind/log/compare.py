@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -97,8 +98,13 @@ def differences(
         skip: fields that are not compared.
     """
     for field in matched.one:
-        one, other = matched.one[field], matched.other.get(field)
-        if field in skip or other is None or one.shape != other.shape or one.size == 0:
+        if field in skip or not len(matched.time_ns):
+            continue
+        one, other = matched.one[field], matched.other.get(field, np.empty((len(matched.time_ns), 0)))
+        if one.shape != other.shape:
+            yield _other_size(topic, field, matched, one.shape[1], other.shape[1])
+            continue
+        if not one.size:
             continue
         distance = deviation(one, other)
         # A gap is a difference of positions, round-off most of the time.
@@ -118,6 +124,21 @@ def largest(*arrays: NDArray[Any]) -> float:
     return float(np.max(values, where=np.isfinite(values), initial=0.0))
 
 
+def _other_size(topic: str, field: str, matched: Matched, one: int, other: int) -> FieldDifference:
+    """Return the difference of a field that does not have the same number of values in both logs."""
+    values = (f"{one} values", f"{other} values")
+    first = Difference(*_at(topic, matched, 0), field, None, None, *values, None)
+    everywhere = len(matched.time_ns)
+    return FieldDifference(topic, field, first, math.inf, math.inf, first.time_ns / 1e9, None, everywhere)
+
+
+def _at(topic: str, matched: Matched, row: int) -> tuple[str, int, int, int]:
+    """Return topic, step, simulation time [ns] and iteration of a message."""
+    columns = matched.one
+    iteration = int(columns["iteration"][row, 0]) if "iteration" in columns else 0
+    return topic, int(columns["step"][row, 0]), int(matched.time_ns[row]), iteration
+
+
 def _field(
     topic: str,
     field: str,
@@ -133,10 +154,7 @@ def _field(
     numbers = isinstance(one, float) and isinstance(other, float)
     element = None if distance.shape[1] == 1 else column
     first = Difference(
-        topic,
-        int(matched.one["step"][row, 0]),
-        int(matched.time_ns[row]),
-        int(matched.one["iteration"][row, 0]) if "iteration" in matched.one else 0,
+        *_at(topic, matched, row),
         field,
         element,
         finder.body(topic, field, element),

@@ -193,11 +193,11 @@ class Log:
         """Communication steps of the run; of a cut log, those that can be read."""
         if "steps" in self.ending:
             return int(self.ending["steps"])
-        payloads = [message.payload for message in self.raw(contents.STATE)]
-        if not payloads:
-            return 0
-        first, last = (MESSAGES["State"].FromString(payload).step for payload in (payloads[0], payloads[-1]))
-        return int(last - first)
+        first = last = b""
+        for message in self.raw(contents.STATE):
+            first, last = first or message.payload, message.payload
+        begin, end = (MESSAGES["State"].FromString(payload).step for payload in (first, last))
+        return int(end - begin)
 
     @property
     def info(self) -> LogInfo:
