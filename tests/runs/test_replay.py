@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import math
 import os
+import pty
 import signal
 import subprocess
 import sys
+import termios
 import threading
 from collections.abc import Iterator
 from contextlib import closing
@@ -18,9 +20,10 @@ import pytest
 import zenoh
 
 from linkwind.bus.zenoh import ZenohPlayer, ZenohProviderLink, loopback_endpoint, open_session
+from linkwind.cli.keys import keys
 from linkwind.errors import InputError, LostError
 from linkwind.log.reader import open_log
-from linkwind.runs.replay import Replayed, Selection, replay
+from linkwind.runs.replay import TICK, Replayed, Selection, Steering, replay
 from linkwind.runs.run import run
 from linkwind.scenario import load
 from linkwind.schema import MESSAGES
@@ -57,7 +60,7 @@ class Subscriber:
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
         self.got.append((str(sample.key_expr), sample.payload.to_bytes()))
-        if len(self.got) == self._enough:
+        if len(self.got) >= self._enough:
             self.done.set()
 
     def _on_presence(self, sample: zenoh.Sample) -> None:
@@ -65,6 +68,11 @@ class Subscriber:
         self.present.append((str(sample.key_expr).rsplit("/", 1)[1], there))
         if sum(not there for _, there in self.present) == 2:
             self.gone.set()
+
+    def await_count(self, count: int) -> None:
+        self.done.clear()
+        self._enough = count
+        assert len(self.got) >= count or self.done.wait(PATIENCE)
 
     def close(self) -> None:
         self.session.close()
@@ -255,10 +263,95 @@ def test_what_makes_no_sense_is_refused(log: Path, arguments: tuple[Any, ...], t
         play(log, *arguments)
 
 
-def start(log: Path, endpoint: str, *options: str) -> subprocess.Popen[str]:
+def test_steering_holds_and_lets_single_points_pass() -> None:
+    steering = Steering()
+    assert [steering.holds(t) for t in (0, 0, 1)] == [False, False, False]
+    steering.toggle()
+    assert not steering.holds(1)  # the point that has begun is finished
+    assert steering.holds(2)
+    assert steering.holds(2)
+    steering.step()
+    assert [steering.holds(t) for t in (2, 2, 3)] == [False, False, True]
+    steering.step()
+    steering.step()
+    assert [steering.holds(t) for t in (3, 4, 4, 5)] == [False, False, False, True]
+    steering.toggle()
+    assert not steering.holds(5)
+    steering.step()  # while it goes on: pauses after the next one
+    assert [steering.holds(t) for t in (5, 6, 6, 7)] == [False, False, False, True]
+
+
+@pytest.mark.usefixtures("faked")
+def test_a_pause_makes_nothing_late(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    steering, slept = Steering(), clock.sleep
+
+    def sleep(seconds: float) -> None:
+        slept(seconds)
+        if seconds == TICK and clock.now > 110.0:
+            steering.toggle()
+
+    monkeypatch.setattr(clock, "sleep", sleep)
+    put = FakePlayer.put
+
+    def pause(player: FakePlayer, topic: str, payload: bytes) -> None:
+        put(player, topic, payload)
+        if len(player.sent) == 100:
+            steering.toggle()
+
+    monkeypatch.setattr(FakePlayer, "put", pause)
+    done = replay(open_log(log), Selection(), listen=["x"], connect=[], steering=steering)
+    sent = FakePlayer.made.sent
+    assert done.messages == len(sent) == 2 * (STEPS + 1) + 1
+    assert sent[99][0] < 100.1
+    assert sent[100][0] > 110.0
+    assert sent[-1][0] - sent[100][0] == pytest.approx((STEPS - 50) / 1000, abs=2e-3)
+    assert done.late_ms is not None
+    assert done.late_ms[1] < 1.0
+
+
+def test_keys_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    ours, terminal = pty.openpty()
+    before = termios.tcgetattr(terminal)
+    pressed = threading.Event()
+    seen: list[str] = []
+    with os.fdopen(terminal, "r") as stdin:
+        monkeypatch.setattr("sys.stdin", stdin)
+        with keys({" ": lambda: seen.append("space"), ".": pressed.set}):
+            os.write(ours, b" x .")
+            assert pressed.wait(PATIENCE)
+            assert seen == ["space", "space"]
+        assert termios.tcgetattr(terminal) == before
+    os.close(ours)
+
+
+def test_paused_stepped_and_resumed_from_the_keyboard(log: Path) -> None:
+    endpoint, expected = loopback_endpoint(), recorded(log)
+    ours, terminal = pty.openpty()
+    with closing(Subscriber(endpoint, "linkwind/v1/out/**", enough=1)) as subscriber:
+        process = start(log, endpoint, "--rate", "0.2", stdin=terminal)
+        os.close(terminal)
+        try:
+            assert subscriber.done.wait(PATIENCE)
+            os.write(ours, b" ....")
+            subscriber.await_count(
+                min(len(subscriber.got) + 2, len(expected))
+            )  # paused, it goes on by the steps alone
+            os.write(ours, b" ")
+            subscriber.await_count(len(expected))
+            output, errors = process.communicate(timeout=PATIENCE)
+        finally:
+            process.kill()
+            process.wait()
+        assert process.returncode == 0, errors
+        assert subscriber.got == expected
+    assert f"{len(expected)} messages" in output
+    os.close(ours)
+
+
+def start(log: Path, endpoint: str, *options: str, stdin: int = subprocess.DEVNULL) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, "-m", "linkwind", "replay", str(log), "--listen", endpoint, *options],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from linkwind.cli.keys import keys
 from linkwind.cli.options import ConnectOption, JsonOption, ListenOption, LogArgument
 
 if TYPE_CHECKING:
@@ -39,20 +40,23 @@ def replay(
 ) -> None:
     """Publish the messages of a log as the run did, once somebody subscribes.
 
+    On a terminal, the space bar pauses and goes on, a dot lets one step pass, Ctrl-C ends.
+
     Example: linkwind replay runs/two_link-20260101-120000/log.mcap --rate 0.5 --listen tcp/0.0.0.0:7447
     """
     from linkwind.cli.run import DEFAULT_ENDPOINT
     from linkwind.log.reader import open_log
-    from linkwind.runs.replay import Selection
+    from linkwind.runs.replay import Selection, Steering
     from linkwind.runs.replay import replay as replay_log
     from linkwind.runs.run import terminate_as_interrupt
 
     opened = open_log(log)
     selection = Selection(rate, start, end, tuple(topics or ()), loop)
+    steering = Steering()
     ends = {"listen": listen or ([] if connect else [DEFAULT_ENDPOINT]), "connect": connect or []}
 
     def job(progress: Callable[[float], None]) -> Replayed:
-        return replay_log(opened, selection, **ends, progress=progress)
+        return replay_log(opened, selection, **ends, progress=progress, steering=steering)
 
     with terminate_as_interrupt():
         if opened.damage is not None:
@@ -62,7 +66,8 @@ def replay(
         else:
             where = ", ".join([*ends["listen"], *ends["connect"]])
             typer.echo(f"waiting at {where} for a subscriber of linkwind/v1/{opened.run}/**")
-            done = _behind_a_bar(opened, selection.start or 0.0, end, job)
+            with keys({" ": steering.toggle, ".": steering.step}):
+                done = _behind_a_bar(opened, selection.start or 0.0, end, job)
     if not done.heard:
         typer.echo("note: at the end nobody listened any more", err=True)
     if as_json:

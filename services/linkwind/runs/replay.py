@@ -17,6 +17,7 @@ from linkwind.scenario import from_json
 
 GRACE = 0.5  # s for subscribers of further topics, once there is one
 PROGRESS = 0.1  # s of wall clock between two words about progress
+TICK = 0.02  # s between two looks while paused
 RESOLUTION = 1e-5  # s in which lateness is counted, so that memory does not grow with the replay
 
 
@@ -66,6 +67,34 @@ class Selection:
     loop: bool = False
 
 
+class Steering:
+    """Pauses a replay and lets single communication points pass; may be used from another thread."""
+
+    def __init__(self) -> None:
+        self._paused = False
+        self._steps = 0
+        self._at = -1  # simulation time of the communication point that passes [ns]
+
+    def toggle(self) -> None:
+        """Pause, or go on."""
+        self._paused = not self._paused
+        self._steps = 0
+
+    def step(self) -> None:
+        """Pause, and let the messages of one more communication point pass."""
+        self._steps = self._steps + 1 if self._paused else 1
+        self._paused = True
+
+    def holds(self, time_ns: int) -> bool:
+        """Tell whether a message of simulation time ``time_ns`` has to wait; asked again until it has not."""
+        if self._paused and time_ns != self._at:
+            if not self._steps:
+                return True
+            self._steps -= 1
+        self._at = time_ns
+        return False
+
+
 def replay(
     log: Log,
     selection: Selection,
@@ -73,6 +102,7 @@ def replay(
     listen: Sequence[str],
     connect: Sequence[str],
     progress: Callable[[float], None] = lambda t: None,
+    steering: Steering | None = None,
 ) -> Replayed:
     """Wait for a subscriber, then publish.
 
@@ -82,6 +112,7 @@ def replay(
         listen: zenoh endpoints to listen on.
         connect: zenoh endpoints to connect to.
         progress: is told now and then the simulation time [s].
+        steering: pauses it; None for no pause.
 
     Raises:
         InputError: a topic, a time or the rate is wrong, or an endpoint cannot be opened.
@@ -99,7 +130,7 @@ def replay(
                 f"nobody subscribed to linkwind/v1/{log.run}/** within {timeout:g} s. Start the subscriber, "
                 f"connected to {', '.join([*listen, *connect])}, and replay again."
             )
-        pace = _Pace(selection.rate)
+        pace = _Pace(selection.rate, steering or Steering())
         messages, start = 0, time.perf_counter()
         told = start
         for topic, time_ns, payload in _published(log, selection, topics, pace):
@@ -161,8 +192,9 @@ def _window(log: Log, selection: Selection, topics: Sequence[str]) -> Iterator[t
 class _Pace:
     """Lets simulation time pass at a rate of wall-clock time, and keeps how late it was."""
 
-    def __init__(self, rate: float) -> None:
+    def __init__(self, rate: float, steering: Steering) -> None:
         self._rate = rate
+        self._steering = steering
         self._late: Counter[int] = Counter()
         self._origin_ns: int | None = None
         self._origin = 0.0
@@ -174,7 +206,7 @@ class _Pace:
 
     def wait(self, time_ns: int) -> float:
         """Wait until a message of simulation time ``time_ns`` is due; return the wall clock [s]."""
-        now = time.perf_counter()
+        now = self._held(time_ns)
         if not self._rate:
             return now
         if self._origin_ns is None:
@@ -184,6 +216,15 @@ class _Pace:
             time.sleep(due - now)
             now = time.perf_counter()
         self._late[round((now - due) / RESOLUTION)] += 1
+        return now
+
+    def _held(self, time_ns: int) -> float:
+        """Wait while paused, without time passing for the replay; return the wall clock [s]."""
+        began = now = time.perf_counter()
+        while self._steering.holds(time_ns):
+            time.sleep(TICK)
+            now = time.perf_counter()
+        self._origin += now - began
         return now
 
     @property
