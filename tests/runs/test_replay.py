@@ -358,7 +358,7 @@ def start(log: Path, endpoint: str, *options: str, stdin: int = subprocess.DEVNU
 def test_command(log: Path) -> None:
     endpoint, expected = loopback_endpoint(), recorded(log)
     with closing(Subscriber(endpoint, "linkwind/v1/out/**", enough=len(expected))) as subscriber:
-        process = start(log, endpoint, "--rate", "20", "--json")
+        process = start(log, endpoint, "--rate", "20", "--topics", "/motion,/wrench/aero", "--json")
         output, errors = process.communicate(timeout=PATIENCE)
         assert process.returncode == 0, errors
         assert subscriber.done.wait(PATIENCE)

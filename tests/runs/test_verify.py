@@ -263,12 +263,16 @@ def test_behind_a_hole_the_comparison_goes_on(tmp_path: Path) -> None:
     other = rewrite(path, tmp_path / "other.mcap", later)
     for source, step in ((path, None), (other, 390)):
         data = bytearray(source.read_bytes())
-        data[len(data) // 4] ^= 1
+        data[len(data) // 2] ^= 1
         hole = tmp_path / "hole.mcap"
         hole.write_bytes(data)
         opened = open_log(hole)
         assert opened.damage is not None
         assert not opened.damage.cut
+        driven = check(hole, from_recorded_wrenches=True)  # without the wrenches it cannot go on
+        assert driven.identical
+        assert 0 < driven.steps < 300
+        assert "the wrench of aero at step" in driven.remark
         found = check(hole)
         assert "damaged" in found.remark
         if step is None:

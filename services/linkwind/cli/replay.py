@@ -31,7 +31,7 @@ def replay(
     end: Annotated[float | None, typer.Option(help="End at this simulation time [s].")] = None,
     topics: Annotated[
         list[str] | None,
-        typer.Option(metavar="TOPIC", help="Only this topic, such as /motion or /wrench/aero; repeatable."),
+        typer.Option(metavar="TOPIC,…", help="Only these topics, such as /motion,/wrench/aero."),
     ] = None,
     loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end, until Ctrl-C.")] = False,
     listen: ListenOption = None,
@@ -51,7 +51,8 @@ def replay(
     from linkwind.runs.run import terminate_as_interrupt
 
     opened = open_log(log)
-    selection = Selection(rate, start, end, tuple(topics or ()), loop)
+    chosen = tuple(topic for text in topics or () for topic in text.split(","))
+    selection = Selection(rate, start, end, chosen, loop)
     steering = Steering()
     ends = {"listen": listen or ([] if connect else [DEFAULT_ENDPOINT]), "connect": connect or []}
 
