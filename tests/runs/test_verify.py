@@ -14,6 +14,7 @@ from linkwind.errors import FaultError, InputError, LogError
 from linkwind.log import contents
 from linkwind.log.difference import ulp
 from linkwind.log.reader import open_log
+from linkwind.log.recover import recover
 from linkwind.runs.run import run
 from linkwind.runs.verify import Verified, scenario_of, verify
 from linkwind.scenario import builtin_names, load
@@ -275,6 +276,10 @@ def test_behind_a_hole_the_comparison_goes_on(tmp_path: Path) -> None:
         assert "the wrench of aero at step" in driven.remark
         found = check(hole)
         assert "damaged" in found.remark
+        clean = check(recover(hole, tmp_path / f"clean-{step}.mcap").file)
+        assert (clean.difference, clean.steps, clean.messages) == (
+            found.difference, found.steps, found.messages,
+        )  # fmt: skip
         if step is None:
             assert (found.difference, found.steps) == (None, 400)
         else:
