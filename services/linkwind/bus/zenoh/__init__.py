@@ -1,0 +1,20 @@
+"""Eclipse zenoh as the transport: two processes find each other without a broker.
+
+Publishers and subscribers carry the lock step, a queryable the control requests, liveliness tokens tell
+who is there. Multicast, gossip and shared memory are off: endpoints are explicit, messages small.
+"""
+
+from linkwind.bus.zenoh.dynamics import SPIN, ZenohDynamicsLink
+from linkwind.bus.zenoh.player import ZenohPlayer
+from linkwind.bus.zenoh.provider import ZenohProviderLink
+from linkwind.bus.zenoh.session import LEASE, loopback_endpoint, open_session
+
+__all__ = [
+    "LEASE",
+    "SPIN",
+    "ZenohDynamicsLink",
+    "ZenohPlayer",
+    "ZenohProviderLink",
+    "loopback_endpoint",
+    "open_session",
+]

@@ -1,0 +1,130 @@
+"""The dynamics' end."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+import zenoh
+
+from linkwind.bus.base import PREFIX
+from linkwind.bus.zenoh.endpoint import TICK, Endpoint
+from linkwind.bus.zenoh.session import LEASE, key_segment
+from linkwind.errors import AnswerTimeoutError, LinkwindError, LostError
+
+# s that the dynamics looks for an answer before it sleeps: a processor that is awake answers two to four
+# times faster. Only one side may do so, and only if it does not take the other's processor away.
+SPIN = 200e-6 if len(os.sched_getaffinity(0)) > 1 else 0.0
+FIRST_RESEND = 0.5  # s; the first motion may be lost while declarations still travel
+
+
+class Exchanging(Protocol):
+    """What the dynamics' link asks of the session, to know who is missing and where the run is."""
+
+    run: str
+    failure: LinkwindError | None
+
+    def control(self, request: bytes) -> bytes: ...
+    def where(self) -> str: ...
+    @property
+    def unanswered(self) -> Sequence[str]: ...
+    @property
+    def not_gone(self) -> Sequence[str]: ...
+
+
+class ZenohDynamicsLink(Endpoint):
+    """The dynamics' end."""
+
+    def __init__(
+        self, session: Exchanging, listen: Sequence[str], connect: Sequence[str], timeout: float
+    ) -> None:
+        """Open the bus and answer control requests from now on.
+
+        Args:
+            session: the protocol's state machine.
+            listen: zenoh endpoints to listen on, such as ``tcp/127.0.0.1:7447``.
+            connect: zenoh endpoints to connect to, such as a router's.
+            timeout: [s] that a living provider may take to answer.
+
+        Raises:
+            InputError: an endpoint cannot be opened.
+        """
+        base = f"{PREFIX}/{key_segment(session.run, '--run')}"
+        super().__init__(listen, connect)
+        self._exchanging = session
+        self._timeout = timeout
+        self._posted_at = float("inf")
+        self._waiting_since = float("inf")
+        self._first_motion = b""
+        self._resend_at: float | None = None
+        self._changed = threading.Condition()
+        self._join(f"{base}/wrench/*", f"{base}/motion", session.run, "dynamics")
+        self._control = self._session.declare_queryable(f"{base}/control", self._on_control, complete=True)
+
+    def _on_control(self, query: zenoh.Query) -> None:
+        with query, self._changed:
+            request = query.payload.to_bytes() if query.payload is not None else b""
+            query.reply(f"{PREFIX}/{self._exchanging.run}/control", self._exchanging.control(request))
+            if self._exchanging.failure is not None:
+                self._fail(self._exchanging.failure)
+            self._changed.notify_all()
+
+    def _seen(self, name: str, present: bool) -> None:
+        if not present and name in self._exchanging.not_gone:
+            self._fail(
+                LostError(
+                    f'"{name}" was lost at {self._exchanging.where()}: its process ended, was stopped for '
+                    f"more than {LEASE:g} s, or the network was cut. Look at its output"
+                )
+            )
+
+    def _check(self) -> None:
+        now, resend_at = time.monotonic(), self._resend_at
+        if resend_at is not None and now > resend_at:
+            self._resend_at = now + 2.0 * (now - self._posted_at)
+            self._outgoing.put(self._first_motion)
+        if now - self._waiting_since > self._timeout:
+            late = " and ".join(f'"{name}"' for name in self._exchanging.unanswered)
+            self._fail(
+                AnswerTimeoutError(
+                    f"no Wrench from {late} for {self._exchanging.where()} within {self._timeout:g} s; it is "
+                    "alive. Is it still computing? Raise coupling.timeout, or look at its output"
+                )
+            )
+
+    def wait(self, done: Callable[[], bool], timeout: float, poll: Callable[[], None]) -> bool:
+        """Wait until ``done`` holds; see :class:`linkwind.bus.base.DynamicsLink`."""
+        end = time.monotonic() + timeout
+        with self._changed:
+            while not done():
+                if self._trouble is not None:
+                    raise self._trouble
+                if time.monotonic() > end:
+                    return False
+                self._changed.wait(TICK)
+                poll()
+        return True
+
+    def post(self, motion: bytes) -> None:
+        """Send a motion message to every provider."""
+        self._resend_at = None
+        if not self._first_motion:
+            self._first_motion = motion
+            self._posted_at = time.monotonic()
+            self._resend_at = self._posted_at + FIRST_RESEND
+        self._outgoing.put(motion)
+
+    def fault(self, payload: bytes) -> None:
+        """Tell every provider that the run is over, and why."""
+        self._session.put(self._fault_key, payload, congestion_control=zenoh.CongestionControl.BLOCK)
+
+    def receive(self) -> tuple[str, bytes]:
+        """Return the next wrench message and its provider; see :class:`~linkwind.bus.base.DynamicsLink`."""
+        # The provider's time to answer runs while the dynamics waits, not while it writes its log.
+        self._waiting_since = time.monotonic()
+        sample = self._receive(SPIN)
+        self._waiting_since = float("inf")
+        return str(sample.key_expr).rsplit("/", 1)[1], sample.payload.to_bytes()

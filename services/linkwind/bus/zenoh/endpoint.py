@@ -1,0 +1,115 @@
+"""What both ends of the lock step share: reading, a watchdog, presence."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Sequence
+
+import zenoh
+from zenoh.handlers import FifoChannel
+
+from linkwind.bus.base import PREFIX
+from linkwind.bus.zenoh.session import open_session
+from linkwind.errors import LinkwindError
+from linkwind.protocol import fault_error
+
+TICK = 0.1  # s between two looks of the watchdog
+
+
+class Endpoint:
+    """What both ends share: a queue of incoming messages whose reader can be woken up by trouble."""
+
+    def __init__(self, listen: Sequence[str], connect: Sequence[str]) -> None:
+        self._session = open_session(listen, connect)
+        self._trouble: LinkwindError | None = None
+        self._reading = False
+        self._closing = threading.Event()
+        self._look = threading.Event()
+        self._watchdog = threading.Thread(target=self._watch, name="linkwind-watchdog", daemon=True)
+
+    def _join(self, incoming: str, outgoing: str, run: str, participant: str) -> None:
+        """Declare the lock-step keys, the fault key and the liveliness token; start the watchdog."""
+        self._wake_key = incoming.replace("*", "~wake")
+        self._fault_key = f"{PREFIX}/{run}/fault"
+        declare = self._session
+        self._incoming = declare.declare_subscriber(incoming, FifoChannel(256))
+        self._faults = declare.declare_subscriber(
+            self._fault_key, self._on_fault, allowed_origin=zenoh.Locality.REMOTE
+        )
+        self._outgoing = declare.declare_publisher(
+            outgoing, congestion_control=zenoh.CongestionControl.BLOCK, express=True
+        )
+        liveliness = self._session.liveliness()
+        self._presence = liveliness.declare_subscriber(
+            f"{PREFIX}/{run}/alive/*", self._on_presence, history=True
+        )
+        self._token = liveliness.declare_token(f"{PREFIX}/{run}/alive/{participant}")
+        self._watchdog.start()
+
+    def _on_fault(self, sample: zenoh.Sample) -> None:
+        try:
+            self._fail(fault_error(sample.payload.to_bytes()))
+        except LinkwindError as error:
+            self._fail(error)
+
+    def _on_presence(self, sample: zenoh.Sample) -> None:
+        name = str(sample.key_expr).rsplit("/", 1)[1]
+        self._seen(name, sample.kind == zenoh.SampleKind.PUT)
+
+    def _seen(self, name: str, present: bool) -> None:
+        raise NotImplementedError
+
+    def _fail(self, error: LinkwindError) -> None:
+        if self._trouble is None:
+            self._trouble = error
+            self._look.set()
+
+    def _watch(self) -> None:
+        """Look around every tick; wake the reader up so that it sees trouble, or a signal."""
+        while not self._closing.is_set():
+            self._look.wait(TICK)
+            self._look.clear()
+            if not self._closing.is_set():
+                self._check()
+                if self._reading:  # else nobody would take it away, and a full queue blocks
+                    self._wake()
+
+    def _check(self) -> None:
+        raise NotImplementedError
+
+    def _wake(self) -> None:
+        self._session.put(
+            self._wake_key,
+            b"",
+            allowed_destination=zenoh.Locality.SESSION_LOCAL,
+            congestion_control=zenoh.CongestionControl.DROP,
+        )
+
+    def _receive(self, spin: float = 0.0) -> zenoh.Sample:
+        """Return the next message that is not empty; look for it for ``spin`` [s], then sleep."""
+        while True:
+            sample = self._look_for_sample(spin)
+            if sample is None:
+                self._reading = True
+                sample = self._incoming.recv()
+                self._reading = False
+            if self._trouble is not None:
+                raise self._trouble
+            if len(sample.payload):
+                return sample
+
+    def _look_for_sample(self, spin: float) -> zenoh.Sample | None:
+        end = time.perf_counter() + spin
+        while time.perf_counter() < end:
+            if (sample := self._incoming.try_recv()) is not None:
+                return sample
+        return None
+
+    def close(self) -> None:
+        """Leave the bus."""
+        self._closing.set()
+        self._look.set()
+        if self._watchdog.is_alive():
+            self._watchdog.join()
+        self._session.close()  # type: ignore[no-untyped-call]

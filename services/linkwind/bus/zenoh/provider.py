@@ -1,0 +1,87 @@
+"""A provider's end."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import zenoh
+
+from linkwind.bus.base import PREFIX
+from linkwind.bus.zenoh.endpoint import Endpoint
+from linkwind.bus.zenoh.session import LEASE, key_segment
+from linkwind.errors import LostError, ParticipantError
+
+
+class ZenohProviderLink(Endpoint):
+    """A provider's end."""
+
+    def __init__(self, connect: Sequence[str], listen: Sequence[str], run: str = "*") -> None:
+        """Open the bus; nothing needs to be listening there yet.
+
+        Args:
+            connect: zenoh endpoints of the dynamics or a router.
+            listen: zenoh endpoints to listen on.
+            run: id of the run to take part in, ``*`` for the only one that is there.
+        """
+        self._run = run if run == "*" else key_segment(run, "--run")
+        super().__init__(listen, connect)
+        self._connect = connect
+        self._dynamics_seen = False
+        self._joined_at = float("inf")
+
+    def request(self, payload: bytes, timeout: float) -> bytes:
+        """Send a control request and return the answer; see :class:`~linkwind.bus.base.ProviderLink`."""
+        end = time.monotonic() + timeout
+        while time.monotonic() < end:
+            replies = [r for r in self._ask(payload, min(1.0, timeout)) if r.ok is not None]
+            if len(replies) > 1:
+                runs = ", ".join(sorted(str(r.ok.key_expr).split("/")[2] for r in replies))
+                raise ParticipantError(f"expected one dynamics; got runs {runs}. Choose one with --run")
+            if replies:
+                return bytes(replies[0].ok.payload.to_bytes())
+            self._closing.wait(0.02)
+        where = ", ".join(self._connect) or "any endpoint"
+        raise LostError(
+            f"no dynamics answered at {where} within {timeout:g} s. Is it running and listening there? "
+            "Start it with: linkwind dynamics SCENARIO --listen ENDPOINT"
+        )
+
+    def _ask(self, payload: bytes, timeout: float) -> list[Any]:
+        replies = self._session.get(
+            f"{PREFIX}/{self._run}/control",
+            payload=payload,
+            timeout=timeout,
+            consolidation=zenoh.ConsolidationMode.NONE,
+        )
+        return list(replies)
+
+    def join(self, run: str, name: str) -> None:
+        """Take part in ``run``: from now on motion messages come in."""
+        self._run = key_segment(run, "--run")
+        self._joined_at = time.monotonic()
+        self._join(
+            f"{PREFIX}/{run}/motion", f"{PREFIX}/{run}/wrench/{key_segment(name, '--name')}", run, name
+        )
+
+    def _seen(self, name: str, present: bool) -> None:
+        if name == "dynamics":
+            self._dynamics_seen = self._dynamics_seen or present
+            if not present:
+                self._fail(LostError(f"the dynamics was lost: {self._lost()}"))
+
+    def _lost(self) -> str:
+        return f"its process ended, was stopped for more than {LEASE:g} s, or the network was cut"
+
+    def _check(self) -> None:
+        if not self._dynamics_seen and time.monotonic() - self._joined_at > 3.0 * LEASE:
+            self._fail(LostError(f"the dynamics was lost during the hand-shake: {self._lost()}"))
+
+    def receive(self) -> bytes:
+        """Return the next motion message; see :class:`~linkwind.bus.base.ProviderLink`."""
+        return self._receive().payload.to_bytes()
+
+    def reply(self, wrench: bytes) -> None:
+        """Send a wrench message to the dynamics."""
+        self._outgoing.put(wrench)
