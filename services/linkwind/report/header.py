@@ -54,7 +54,11 @@ def tiles(run: Run) -> str:
         ),
         ("Energy off by", _amount(off, "J"), "at most, since t₀"),
         ("Median exchange", _amount(median, "s"), f"99 % in {_amount(late, 's')}"),
-        ("Final state", digest[:8] if digest else "–", "SHA-256, in full below"),
+        (
+            "Final state" if run.complete else "Last state",
+            digest[:8] if digest else "–",
+            "SHA-256, in full below",
+        ),
     ]
     return "\n".join(
         f"<div><dt>{escape(term)}</dt><dd>{escape(value)}<small>{escape(detail)}</small></dd></div>"
