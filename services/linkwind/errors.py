@@ -15,10 +15,10 @@
     │   ├── AnswerTimeoutError           a participant is alive but does not answer
     │   ├── FaultError                   a participant reported that it cannot go on
     │   └── SimulationError              numerical trouble: NaN, singular inertia, step underflow
-    ├── VerificationError            5   two runs that should be equal are not
     └── StoppedError               130   somebody stopped the run: Ctrl-C or SIGTERM
 
-A message says what, which item, expected, got, and what to do.
+A message says what, which item, expected, got, and what to do. That two runs differ is an answer, not an
+exception: the commands that compare end with exit code 5 (``linkwind.cli.options.DIFFERENT``).
 """
 
 from __future__ import annotations
@@ -80,12 +80,6 @@ class FaultError(ParticipantError):
 
 class SimulationError(ParticipantError):
     """Numerical trouble: not a number, singular inertia, step-size underflow."""
-
-
-class VerificationError(LinkwindError):
-    """Two runs that should be equal are not."""
-
-    exit_code = 5
 
 
 class StoppedError(LinkwindError):

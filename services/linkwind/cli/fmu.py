@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from linkwind.cli.fmu_map import fmu_map
-from linkwind.cli.options import JsonOption, ScenarioArgument, SetOption
+from linkwind.cli.options import DIFFERENT, JsonOption, ScenarioArgument, SetOption
 
 if TYPE_CHECKING:
     from linkwind.fmi.check import Checked
@@ -111,7 +111,7 @@ def check(file: FileArgument, as_json: JsonOption = False) -> None:
     else:
         _show(found)
     if not found.ok:
-        raise typer.Exit(5)
+        raise typer.Exit(DIFFERENT)
 
 
 def _as_json(found: Checked) -> dict[str, Any]:

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+DIFFERENT = 5  # exit code: two things that should be equal are not
+
 ScenarioArgument = Annotated[str, typer.Argument(help="A built-in scenario's name, or a TOML file.")]
 LogArgument = Annotated[Path, typer.Argument(help="The MCAP log of a run.")]
 OutOption = Annotated[

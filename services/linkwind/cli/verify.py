@@ -10,15 +10,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from linkwind.cli.force_fmu import ForceFmuOption, files_by_provider, refuse_missing
-from linkwind.cli.options import JsonOption, LogArgument
+from linkwind.cli.options import DIFFERENT, JsonOption, LogArgument
 
 if TYPE_CHECKING:
     from linkwind.log.reader import Log
     from linkwind.runs.diff import Compared, Growth
     from linkwind.runs.verify import Verified
     from linkwind.scenario import Scenario
-
-DIFFERENT = 5  # exit code
 
 
 def register(app: typer.Typer) -> None:
