@@ -284,9 +284,9 @@ def test_units_get_the_prefix_that_suits_the_value(value, factor, unit):
 def test_bodies_without_a_shape_are_drawn_by_their_joints_or_their_radius_of_gyration():
     bodies = [{"name": name, "mass": 2.0, "inertia": 0.5} for name in ("link1", "link2")]
     jointed = Page(render(planar(2, bodies=bodies))).data["scene"]["bodies"]
-    assert jointed[0]["outline"] == [[-0.25, 0, 0], [0.25, 0, 0]]
+    assert jointed[0]["lines"][0]["points"] == [[-0.25, 0, 0], [0.25, 0, 0]]
     loose = Page(render(planar(2, bodies=bodies, joints=[]))).data["scene"]["bodies"]
-    np.testing.assert_allclose(np.linalg.norm(loose[0]["outline"], axis=1), 0.5)
+    np.testing.assert_allclose(np.linalg.norm(loose[0]["lines"][0]["points"], axis=1), 0.5)
 
 
 def test_the_tables_hold_the_scenario(page):

@@ -39,8 +39,10 @@ def strokes(scenario: Scenario, mechanism: Mechanism) -> list[Stroke]:
         centre, turn = motion.position[i], matrix(motion.orientation[i])
         joint = centre + turn @ mechanism.tables.child_point[i]
         if body.shape:
-            half = turn @ np.array([body.shape.length / 2.0, 0.0, 0.0])
-            lines.append((centre - half, centre + half, 0.05, _BODY))
+            outline = np.pad(body.shape.outline(), ((0, 0), (0, 1))) @ turn.T + centre
+            width = 0.025 if body.shape.closed else 0.05
+            sides = list(zip(outline, np.roll(outline, -1, axis=0), strict=True))
+            lines += [(*side, width, _BODY) for side in (sides if body.shape.closed else sides[:-1])]
         else:
             lines.append((joint, centre, 0.03, _BODY))
             points.append((centre, centre, 0.09, _BODY))

@@ -1,4 +1,4 @@
-"""Pictures of a run for Foxglove: transforms of the bodies and a scene with plates, joints and forces.
+"""Pictures of a run for Foxglove: transforms of the bodies and a scene with shapes, joints and forces.
 
 Every update holds the whole scene, because after a jump in time Foxglove shows the latest message of a
 topic only. Frames are few: at most 60 a second of simulation time and about 1000 a run, chosen by
@@ -13,7 +13,6 @@ from typing import Any
 from foxglove.messages import (
     ArrowPrimitive,
     Color,
-    CubePrimitive,
     FrameTransform,
     FrameTransforms,
     Pose,
@@ -25,6 +24,8 @@ from foxglove.messages import (
     Vector3,
 )
 
+from linkwind.log.solids import solid
+from linkwind.scenario.shapes import shape_of
 from linkwind.spatial import Motion, Wrench
 
 FRAMES_PER_SECOND = 60.0
@@ -35,15 +36,13 @@ LINK = Color(r=0.27, g=0.51, b=0.71, a=1.0)
 JOINT = Color(r=0.90, g=0.60, b=0.00, a=1.0)
 FORCE = Color(r=0.80, g=0.25, b=0.20, a=1.0)
 
-ORIGIN = Pose(position=Vector3(x=0.0, y=0.0, z=0.0), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0))
-
 
 class Scene:
     """The picture of one scenario's bodies.
 
-    A plate is a box of its length and span, a body without a shape a ball; a joint is a small sphere at
-    its point on the child; a force is an arrow from the centre of mass, as long as the longest plate for
-    the weight of the heaviest body.
+    A body is the solid of its shape, or a ball without one; a joint is a small sphere at its point on the
+    child; a force is an arrow from the centre of mass, as long as the longest shape for the weight of the
+    heaviest body.
 
     Args:
         scenario: the resolved scenario as parsed JSON.
@@ -57,21 +56,17 @@ class Scene:
         steps = round(scenario["time"]["end"] / step)
         self.stride = max(1, math.ceil(1.0 / (FRAMES_PER_SECOND * step)), math.ceil(steps / FRAMES_PER_RUN))
         self._names = [body["name"] for body in bodies]
-        shapes = [body.get("shape") for body in bodies]
-        self._length = max((shape["length"] for shape in shapes if shape), default=1.0)
+        shapes = [shape_of(body.get("shape")) for body in bodies]
+        self._length = max((shape.reference_length for shape in shapes if shape), default=1.0)
         weight = max(body["mass"] for body in bodies) * STANDARD_GRAVITY
         self._metres_per_newton = self._length / weight if weight > 0.0 else self._length
-        self._cubes = [[self._plate(shape)] if shape else [] for shape in shapes]
+        self._solids = [solid(shape, 0.02 * self._length, LINK) if shape else {} for shape in shapes]
         self._balls: list[list[SpherePrimitive]] = [
             [] if shape else [self._ball((0.0, 0.0, 0.0), 0.2, LINK)] for shape in shapes
         ]
         for joint in scenario["joints"]:
             child = self._names.index(joint["child"])
             self._balls[child].append(self._ball(joint["child_point"], 0.06, JOINT))
-
-    def _plate(self, shape: dict[str, Any]) -> CubePrimitive:
-        size = Vector3(x=shape["length"], y=0.02 * self._length, z=shape["span"])
-        return CubePrimitive(pose=ORIGIN, size=size, color=LINK)
 
     def _ball(self, point: Any, diameter: float, color: Color) -> SpherePrimitive:
         x, y, z = point
@@ -104,7 +99,7 @@ class Scene:
             entities.append(
                 SceneEntity(
                     timestamp=stamp, frame_id=name, id=name, frame_locked=True,
-                    cubes=self._cubes[i], spheres=self._balls[i],
+                    spheres=self._balls[i], **self._solids[i],
                 )
             )  # fmt: skip
             arrows = self._arrows(position, force)

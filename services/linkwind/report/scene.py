@@ -9,9 +9,12 @@ import numpy as np
 
 from linkwind.report.arrays import every_nth, pack
 from linkwind.report.data import Run
+from linkwind.scenario.shapes import shape_of
 from linkwind.spatial import Array
 
 FRAMES = 1500
+
+Line = tuple[Array, bool]
 
 
 def scene(run: Run) -> dict[str, Any] | None:
@@ -42,14 +45,14 @@ def scene(run: Run) -> dict[str, Any] | None:
 
 def _body(run: Run, index: int) -> dict[str, Any]:
     body = run.scenario["bodies"][index]
-    outline, closed = _outline(body, _joint_points(run, body["name"]))
-    reach = float(np.linalg.norm(outline[:, : 2 if run.planar else 3], axis=1).max())
+    lines = _lines(body, _joint_points(run, body["name"]), run.planar)
+    points = np.vstack([points for points, _ in lines])
     return {
         "name": body["name"],
         "mass": max(body["mass"], 1e-12),  # weights of a mean, which must not all be 0
-        "outline": outline.tolist(),
-        "closed": closed,
-        "reach": reach,
+        "lines": [{"points": points.tolist(), "closed": closed} for points, closed in lines],
+        "thick": (body.get("shape") or {"type": "plate"})["type"] == "plate",
+        "reach": float(np.linalg.norm(points[:, : 2 if run.planar else 3], axis=1).max()),
     }
 
 
@@ -64,16 +67,29 @@ def _joint_points(run: Run, name: str) -> Array:
     return np.array(points, dtype=float).reshape(-1, 3)
 
 
-def _outline(body: Mapping[str, Any], joint_points: Array) -> tuple[Array, bool]:
-    """Return a polygon in the body frame [m], shape (m, 3), and whether it is closed.
+def _lines(body: Mapping[str, Any], joint_points: Array, planar: bool) -> list[Line]:
+    """Return what is drawn of a body: lines in its frame [m], shape (m, 3), each with whether it is closed.
 
-    A plate is its rectangle. A body without a shape is a line through its joint points and its centre of
-    mass, or, where these coincide, a circle of its radius of gyration.
+    A plate is its rectangle; another shape its outline, in 3-D both faces and four edges between them.
     """
-    shape = body.get("shape")
-    if shape and shape["type"] == "plate":
-        half, side = 0.5 * shape["length"], 0.5 * shape["span"]
-        return np.array([[-half, 0, -side], [half, 0, -side], [half, 0, side], [-half, 0, side]]), True
+    shape = shape_of(body.get("shape"))
+    if shape is None:
+        return [_without_shape(body, joint_points)]
+    outline, half = shape.outline(), 0.5 * shape.span
+    near, far = (np.pad(outline, ((0, 0), (0, 1)), constant_values=z) for z in (-half, half))
+    if not shape.closed:
+        return [(np.vstack([near, far[::-1]]), True)]
+    if planar:
+        return [(np.pad(outline, ((0, 0), (0, 1))), True)]
+    edges = np.linspace(0, len(outline), 4, endpoint=False).astype(int)
+    return [(near, True), (far, True), *((np.stack([near[i], far[i]]), False) for i in edges)]
+
+
+def _without_shape(body: Mapping[str, Any], joint_points: Array) -> Line:
+    """Return a line through the joint points and the centre of mass.
+
+    Where these coincide it is a circle of the radius of gyration.
+    """
     if joint_points.size and np.abs(joint_points).max() > 0.0:
         through = np.insert(joint_points, len(joint_points) // 2, 0.0, axis=0)
         if len(joint_points) == 1:

@@ -5,24 +5,30 @@
 500000
 """
 
-from linkwind.scenario.bodies import Body, Joint, Plate
+from linkwind.scenario.bodies import Body, Joint
 from linkwind.scenario.loading import builtin_names, from_json, load, loads, template
 from linkwind.scenario.model import Scenario
 from linkwind.scenario.providers import FieldExpressions, PlateModel, Provider
 from linkwind.scenario.settings import Bus, Coupling, Dynamics, Environment, Gust, Time
+from linkwind.scenario.shapes import AnyShape, Circle, Ellipse, Plate, Polygon, Rectangle
 
 __all__ = [
+    "AnyShape",
     "Body",
     "Bus",
+    "Circle",
     "Coupling",
     "Dynamics",
+    "Ellipse",
     "Environment",
     "FieldExpressions",
     "Gust",
     "Joint",
     "Plate",
     "PlateModel",
+    "Polygon",
     "Provider",
+    "Rectangle",
     "Scenario",
     "Time",
     "builtin_names",

@@ -130,10 +130,11 @@ def _provider_model(scenario: Scenario, provider: Provider, path: Path) -> Itera
         yield Problem((*path, "field"), expected, "nothing", advice)
     if provider.model == "plate":
         for index, body in enumerate(scenario.bodies):
-            if body.name in provider.bodies and body.shape is None:
+            if body.name in provider.bodies and (body.shape is None or body.shape.type != "plate"):
                 expected = f'a plate, which the model of provider "{provider.name}" needs'
-                advice = 'Add shape = { type = "plate", length = … }.'
-                yield Problem(("bodies", index, "shape"), expected, "nothing", advice)
+                got = f'type "{body.shape.type}"' if body.shape else "nothing"
+                advice = f'{"Write" if body.shape else "Add"} shape = {{ type = "plate", length = … }}.'
+                yield Problem(("bodies", index, "shape"), expected, got, advice)
 
 
 def _first(names: Sequence[str]) -> str:

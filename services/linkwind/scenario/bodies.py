@@ -19,6 +19,7 @@ from linkwind.scenario.quantities import (
     numbers,
     quantity,
 )
+from linkwind.scenario.shapes import Circle, Ellipse, Plate, Polygon, Rectangle
 
 JointType = Literal["fixed", "revolute", "prismatic", "planar", "spherical", "free"]
 
@@ -63,14 +64,6 @@ Inertia = Annotated[
 ]
 
 
-class Plate(Section):
-    """A flat plate through the centre of mass: chord along the body's x axis, span along its z axis."""
-
-    type: Literal["plate"] = Field(description="The kind of shape")
-    length: float = quantity("Length along the body's x axis, the chord", "m", gt=0.0)
-    span: float = quantity("Width along the body's z axis", "m", 1.0, gt=0.0)
-
-
 class Body(Section):
     """A rigid body, and how it starts.
 
@@ -86,7 +79,9 @@ class Body(Section):
         "elements [Ixx, Iyy, Izz, Ixy, Ixz, Iyz] in the body frame",
         "kg·m²",
     )
-    shape: Plate | None = Field(default=None, description="Shape, for force models and pictures")
+    shape: Plate | Ellipse | Rectangle | Circle | Polygon | None = Field(
+        default=None, discriminator="type", description="Shape, for force models and pictures"
+    )
     position: Vector | None = quantity("Position of the centre of mass at the start, in the world", "m", None)
     angle_deg: float | None = quantity(
         "Angle at the start, a turn about z from the world's x axis to the body's", "deg", None

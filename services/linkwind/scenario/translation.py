@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
@@ -52,7 +53,11 @@ def problems(error: ValidationError, model: type[BaseModel]) -> list[Problem]:
             pass  # pydantic does not count entries that have errors of their own
         else:
             found.append(_problem(detail, path, model))
-    return [problem for problem in found if problem.path not in meant]
+    return [
+        replace(problem, path=_as_written(problem.path, model))
+        for problem in found
+        if problem.path not in meant
+    ]
 
 
 def _inside(path: Path, table: Path) -> bool:
@@ -66,6 +71,12 @@ def _problem(detail: ErrorDetails, path: Path, model: type[BaseModel]) -> Proble
     if kind == "missing":
         described = f" ({field.description})" if field else ""
         return Problem(path, f"a value{described}", "nothing", f"Add {path[-1]}.")
+    if kind == "union_tag_not_found":
+        words = list(_kinds(field.annotation if field else None))
+        return Problem((*path, "type"), f"one of {', '.join(words)}", "nothing", "Add type.")
+    if kind == "union_tag_invalid":
+        words = list(_kinds(field.annotation if field else None))
+        return choice((*path, "type"), "one of", words, detail["input"]["type"])
     if kind == "literal_error":
         words = re.findall(r"'([^']*)'", str(detail["ctx"]["expected"]))
         return choice(path, "one of", words, detail["input"])
@@ -92,6 +103,7 @@ def _advice(kind: str, value: Any, unit: str) -> str:
         "bool_type": "Write true or false, without quotes.",
         "string_type": 'Write it as "…".',
         "model_type": "Write it as [table] or { key = value }.",
+        "model_attributes_type": "Write it as [table] or { key = value }.",
         "dict_type": "Write it as [table] or { key = value }.",
         "tuple_type": "Write it as [[table]] or [a, b].",
     }
@@ -124,16 +136,34 @@ def _field(model: type[BaseModel], path: Path) -> FieldInfo | None:
 
 
 def _model(model: type[BaseModel], path: Path) -> type[BaseModel] | None:
-    """Return the model of the table at a path."""
+    """Return the model of the table at a path, which may name the kind of a table that has several."""
     current: type[BaseModel] | None = model
     annotation: Any = model
     for part in path:
+        kinds = _kinds(annotation)
         if isinstance(part, str) and current is not None and part in current.model_fields:
             annotation = current.model_fields[part].annotation
-            current = _plain(annotation)
+            current = None if _kinds(annotation) else _plain(annotation)
+        elif part in kinds:
+            annotation = current = kinds[str(part)]
         else:  # an index into a list, or a name in a table of tables
             current = _nested(annotation)
     return current
+
+
+def _as_written(path: Path, model: type[BaseModel]) -> Path:
+    """Return a path without the kinds that pydantic puts in: shape.plate.length is shape.length."""
+    kinds = [_kinds(getattr(_field(model, path[:at]), "annotation", None)) for at in range(len(path))]
+    return tuple(part for part, known in zip(path, kinds, strict=True) if part not in known)
+
+
+def _kinds(annotation: Any) -> dict[str, type[BaseModel]]:
+    """Return the models that an annotation is a choice of, by their ``type``; none where it has one."""
+    parts = [part for part in get_args(annotation) if isinstance(part, type)]
+    models = [part for part in parts if issubclass(part, BaseModel)]
+    if len(models) < 2:
+        return {}
+    return {get_args(model.model_fields["type"].annotation)[0]: model for model in models}
 
 
 def _plain(annotation: Any) -> type[BaseModel] | None:

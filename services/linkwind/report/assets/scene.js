@@ -97,15 +97,17 @@ function makeScene(canvas, scene, clock) {
   function bodies(now, alpha) {
     const order = now.map((pose, b) => [camera.turn(pose.at)[2], b]).sort((p, q) => p[0] - q[0]);
     for (const [, b] of order) {
-      const { outline, closed } = scene.bodies[b], pose = now[b];
+      const { lines, thick, reach } = scene.bodies[b], pose = now[b];
       pen.strokeStyle = pen.fillStyle = colour(bodyColour(b));
       pen.lineJoin = pen.lineCap = "round";
-      pen.lineWidth = Math.max(3.5, (scene.planar ? 0.05 : 0.02) * scene.bodies[b].reach * camera.scale);
-      pen.beginPath();
-      for (const point of outline) pen.lineTo(...camera.project(add(pose.at, turned(pose.q, point))).slice(0, 2));
-      if (closed) { pen.closePath(); pen.globalAlpha = 0.28 * alpha; pen.fill(); }
-      pen.globalAlpha = alpha;
-      pen.stroke();
+      pen.lineWidth = thick ? Math.max(3.5, (scene.planar ? 0.05 : 0.02) * reach * camera.scale) : 2;
+      for (const { points, closed } of lines) {
+        pen.beginPath();
+        for (const point of points) pen.lineTo(...camera.project(add(pose.at, turned(pose.q, point))).slice(0, 2));
+        if (closed) { pen.closePath(); pen.globalAlpha = 0.28 * alpha; pen.fill(); }
+        pen.globalAlpha = alpha;
+        pen.stroke();
+      }
     }
     pen.globalAlpha = 1;
   }

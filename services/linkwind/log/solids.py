@@ -1,0 +1,88 @@
+"""The solid of a shape for Foxglove: a box, a cylinder, or triangles over any outline."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from foxglove.messages import (
+    Color,
+    CubePrimitive,
+    CylinderPrimitive,
+    Point3,
+    Pose,
+    Quaternion,
+    TriangleListPrimitive,
+    Vector3,
+)
+
+from linkwind.scenario.shapes import AnyShape, Circle, Ellipse, Plate, Rectangle
+from linkwind.spatial import Array
+
+ORIGIN = Pose(position=Vector3(x=0.0, y=0.0, z=0.0), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0))
+
+
+def solid(shape: AnyShape, thickness: float, color: Color) -> dict[str, Any]:
+    """Return the primitives of a ``SceneEntity`` in the body frame, by the entity's keys.
+
+    Args:
+        shape: what to draw.
+        thickness: of a plate [m], which has none of its own.
+        color: of the whole.
+    """
+    if isinstance(shape, Plate):
+        return {"cubes": [_cube(shape.length, thickness, shape.span, color)]}
+    if isinstance(shape, Rectangle) and not shape.radius:
+        return {"cubes": [_cube(shape.length, shape.width, shape.span, color)]}
+    if isinstance(shape, Circle | Ellipse):
+        x, y = np.ptp(shape.outline(4), axis=0).tolist()
+        size = Vector3(x=x, y=y, z=shape.span)
+        cylinder = CylinderPrimitive(pose=ORIGIN, size=size, bottom_scale=1.0, top_scale=1.0, color=color)
+        return {"cylinders": [cylinder]}
+    return {"triangles": [_prism(shape.outline(), shape.span, color)]}
+
+
+def _cube(x: float, y: float, z: float, color: Color) -> CubePrimitive:
+    return CubePrimitive(pose=ORIGIN, size=Vector3(x=x, y=y, z=z), color=color)
+
+
+def _prism(outline: Array, span: float, color: Color) -> TriangleListPrimitive:
+    """Return the two faces and the sides between them; the points of the far face follow the near one's."""
+    n = len(outline)
+    points = [Point3(x=x, y=y, z=z) for z in (-0.5 * span, 0.5 * span) for x, y in outline.tolist()]
+    indices = []
+    for a, b, c in triangles(outline):
+        indices += [a, c, b, n + a, n + b, n + c]
+    for i in range(n):
+        j = (i + 1) % n
+        indices += [i, j, n + j, i, n + j, n + i]
+    return TriangleListPrimitive(pose=ORIGIN, points=points, indices=indices, color=color)
+
+
+def triangles(outline: Array) -> list[tuple[int, int, int]]:
+    """Return the triangles that fill a polygon, as indices of its points, by cutting off its ears.
+
+    Args:
+        outline: of a polygon whose sides do not cross, counter-clockwise, shape (n, 2).
+    """
+    left, found = list(range(len(outline))), []
+    while len(left) > 3:
+        corners = [(left[i - 1], left[i], left[(i + 1) % len(left)]) for i in range(len(left))]
+        ear = next((ear for ear in corners if _is_ear(outline, ear, left)), corners[0])
+        found.append(ear)
+        left.remove(ear[1])
+    return [*found, (left[0], left[1], left[2])]
+
+
+def _is_ear(outline: Array, corner: tuple[int, int, int], left: list[int]) -> bool:
+    """Return whether the corner sticks out and holds no other point."""
+    a, b, c = (outline[i] for i in corner)
+    if _side(a, b, c) <= 0.0:
+        return False
+    others = (outline[i] for i in left if i not in corner)
+    return not any(min(_side(a, b, p), _side(b, c, p), _side(c, a, p)) >= 0.0 for p in others)
+
+
+def _side(a: Array, b: Array, p: Array) -> float:
+    """Return twice the area of the triangle a b p, above 0 where p is to the left of the way from a to b."""
+    return float((b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]))
