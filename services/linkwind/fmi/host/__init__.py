@@ -17,6 +17,7 @@
 ``cosimulation``    stepping
 ``modelexchange``   integrating
 ``runner``          the instances of one FMU
+``following``       the worker on the processor of its host
 ``channel``         the messages between host and worker
 ``worker``          the process with the runner, ``process`` the host's end of it, ``inprocess`` without one
 ``instances``       all of it put together: from a file and a scenario's settings to something that steps

@@ -17,6 +17,7 @@ import struct
 import subprocess
 import sys
 import threading
+import time
 import weakref
 from collections import deque
 from collections.abc import Iterable
@@ -24,6 +25,7 @@ from pathlib import Path
 
 from linkwind.errors import SimulationError
 from linkwind.fmi.host.channel import ANSWER, REQUEST, receive
+from linkwind.fmi.host.following import Follower
 from linkwind.fmi.host.plan import Marker, Plan
 
 LAST_LINES = 5  # of the FMU's output, that an error repeats
@@ -107,6 +109,7 @@ class WorkerProcess:
         text = plan.to_json()
         self.request(b"p", 0, text)
         self._set_timeout(timeout)
+        self._follower = Follower(self.pid)
 
     def _start(self, channel: int, shared: int, output: int) -> subprocess.Popen[bytes]:
         environment = {k: v for k, v in os.environ.items() if not k.startswith(_WITHHELD)}
@@ -164,7 +167,11 @@ class WorkerProcess:
 
     def evaluate(self, time_ns: int, *, save: bool) -> bytes:
         """Bring the outputs to the time [ns]; return all memory afterwards if asked to."""
-        return self.request(b"S" if save else b"s", time_ns)
+        self._follower.come()
+        start = time.perf_counter()
+        answer = self.request(b"S" if save else b"s", time_ns)
+        self._follower.took(time.perf_counter() - start)
+        return answer
 
     def save(self) -> bytes:
         """Return all memory of the instances."""
