@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -41,17 +42,30 @@ def compiler() -> list[str]:
     )
 
 
-def compile_library(root: Path, target: Path) -> None:
-    """Compile ``fmu/core`` and ``fmu/aero`` into one shared library."""
-    sources = sorted((root / "fmu" / "core").glob("*.c")) + sorted((root / "fmu" / "aero").glob("*.c"))
-    includes = [f"-I{root / 'fmu' / 'core'}", f"-I{root / 'fmu' / 'aero'}"]
-    partial = target.with_name(target.name + ".partial")
-    command = [*compiler(), *FLAGS, *WARNINGS, *includes, "-shared", "-o", str(partial)]
-    done = subprocess.run([*command, *map(str, sources), "-lm"], capture_output=True, text=True, check=False)
+def run_compiler(*arguments: object, cwd: Path) -> None:
+    """Run the compiler in a folder, and show what it says."""
+    command = [*compiler(), *FLAGS, *WARNINGS, "-pthread", *map(str, arguments)]
+    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
     if done.returncode:
         raise RuntimeError(f"compiling the core failed:\n{' '.join(command)}\n{done.stderr}")
     if done.stderr:
         print(done.stderr, file=sys.stderr)
+
+
+def compile_library(root: Path, target: Path) -> None:
+    """Compile ``fmu/core``, ``fmu/aero`` and ``fmu/flow`` into one shared library.
+
+    The lattice is for vectors, which gcc makes of plain loops at -O3 only.
+    """
+    source = root / "fmu"
+    includes = [f"-I{source / folder}" for folder in ("core", "aero", "flow")]
+    partial = target.with_name(target.name + ".partial")
+    with tempfile.TemporaryDirectory() as folder:
+        objects = Path(folder)
+        exact = [*sorted((source / "core").glob("*.c")), *sorted((source / "aero").glob("*.c"))]
+        run_compiler(*includes, "-c", *exact, cwd=objects)
+        run_compiler(*includes, "-O3", "-c", *sorted((source / "flow").glob("*.c")), cwd=objects)
+        run_compiler("-shared", "-o", partial, *sorted(objects.glob("*.o")), "-lm", cwd=objects)
     partial.replace(target)  # a running process keeps the file that it has mapped
 
 
@@ -59,7 +73,7 @@ def build_data(root: Path) -> None:
     """Fill ``services/linkwind/_data`` with the library, the C sources and the schemas."""
     data = root / "services" / "linkwind" / "_data"
     data.mkdir(exist_ok=True)
-    for folder in ("core", "aero", "fmi"):
+    for folder in ("core", "aero", "fmi", "host"):
         shutil.rmtree(data / "fmu" / folder, ignore_errors=True)
         shutil.copytree(
             root / "fmu" / folder, data / "fmu" / folder, ignore=shutil.ignore_patterns("__pycache__")

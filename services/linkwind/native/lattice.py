@@ -1,0 +1,260 @@
+"""A fluid on a lattice (``fmu/flow``): memory, parameters, and one call a step.
+
+Lattice units: a cell is 1 wide, a step takes 1, the density is 1 at rest, so the speed of sound is 1/√3.
+Equations and sources: ``fmu/README.md``, "Flow on a lattice".
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import weakref
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from linkwind.errors import LinkwindError
+from linkwind.native.library import declare
+
+Floats = NDArray[np.float32]
+
+DIRECTIONS = 9
+MAX_SPEED = 0.3  # cells/step: faster, and the error of the method, of third order in it, is no longer small
+_PADDING = 112  # floats behind each plane: without it all planes of 512 x 448 would share the same cache sets
+_ALIGNMENT = 64  # bytes
+
+
+class _Lattice(ctypes.Structure):
+    """``lw_lattice``."""
+
+    _fields_ = [
+        *((name, ctypes.c_int32) for name in ("nx", "ny", "fringe", "force_begin", "force_end")),
+        ("shear_rate", ctypes.c_float),
+        ("stream", ctypes.c_float * 2),
+        ("plane", ctypes.c_int64),
+        *((name, ctypes.c_void_p) for name in ("populations", "next", "force", "blend", "threads")),
+    ]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """Means over square blocks of cells, row-major, y along the first axis of a plane.
+
+    Attributes:
+        velocity: momentum over mass [cells/step], shape (2, ny // stride, nx // stride).
+        density: less 1, shape (ny // stride, nx // stride).
+        vorticity: ∂v/∂x − ∂u/∂y [1/step] by central differences of ``velocity``, one-sided at the borders,
+            same shape.
+    """
+
+    velocity: Floats
+    density: Floats
+    vorticity: Floats
+
+
+def shear_rate(viscosity: float) -> float:
+    """Return the relaxation rate ω = 1/(3ν + ½) of a kinematic viscosity ν [cells²/step]."""
+    return 1.0 / (3.0 * viscosity + 0.5)
+
+
+class Lattice:
+    """A window full of fluid, surrounded by an undisturbed stream.
+
+    Attributes:
+        nx, ny: cells along x and y.
+        fringe: layers on every side that relax towards the stream.
+        threads: that share a step; the bits do not depend on it.
+        force: on the fluid of each cell in the coming step [cells/step², times the density 1], shape
+            (2, ny, nx), float32; read in ``force_rows`` only, never changed by a step.
+        struct_address: of the ``lw_lattice``, for other functions of the library.
+    """
+
+    def __init__(
+        self,
+        nx: int,
+        ny: int,
+        *,
+        shear_rate: float,
+        stream: tuple[float, float] = (0.0, 0.0),
+        fringe: int = 24,
+        threads: int = 1,
+    ) -> None:
+        """Fill a window with the stream.
+
+        Args:
+            nx: cells along x; steps are fastest where it is a multiple of 16.
+            ny: cells along y.
+            shear_rate: ω between 0 and 2, see ``shear_rate()``.
+            stream: velocity of the undisturbed fluid [cells/step], at most 0.3.
+            fringe: layers on every side that relax towards the stream; layer k by 0.3 ((fringe − k)/fringe)³
+                in a step.
+            threads: that share a step.
+
+        Raises:
+            ValueError: an argument is out of its range.
+            LinkwindError: the threads cannot be started.
+        """
+        _check_size(nx, ny, fringe)
+        if threads < 1:
+            raise ValueError(f"threads: expected 1 or more; got {threads}")
+        self.nx, self.ny, self.fringe, self.threads = nx, ny, fringe, threads
+        plane = -(-nx * ny // 16) * 16 + _PADDING
+        self._memory = _aligned(2 * DIRECTIONS * plane)
+        buffers = self._memory.reshape(2, DIRECTIONS, plane)[:, :, : nx * ny]
+        self._buffers: list[Floats] = [buffer.reshape(DIRECTIONS, ny, nx) for buffer in buffers]
+        self.force = _aligned(2 * ny * nx).reshape(2, ny, nx)
+        self._blend = np.zeros(nx, dtype=np.float32)
+        self._struct = _Lattice(nx=nx, ny=ny, fringe=fringe, plane=plane)
+        for name, array in zip(
+            ("populations", "next", "force", "blend"), (*self._buffers, self.force, self._blend), strict=True
+        ):
+            setattr(self._struct, name, _address(array))
+        self.force_rows = (0, ny)
+        self.shear_rate, self.stream = shear_rate, stream
+        self.struct_address = ctypes.addressof(self._struct)
+        self._start_threads()
+        integer, pointer = ctypes.c_int32, ctypes.c_void_p
+        self._step = declare("lw_lattice_step", [pointer, integer, integer], None)
+        self._moments = declare("lw_lattice_moments", [pointer, integer, pointer, pointer], None)
+        self._halve_step = declare("lw_lattice_halve_step", [pointer, ctypes.c_float])
+        declare("lw_lattice_init", [pointer], None)(self.struct_address)
+
+    def _start_threads(self) -> None:
+        if self.threads == 1:
+            return
+        create = declare("lw_threads_create", [ctypes.c_int32], ctypes.c_void_p)
+        destroy = declare("lw_threads_destroy", [ctypes.c_void_p], None)
+        self._struct.threads = create(self.threads)
+        if not self._struct.threads:
+            raise LinkwindError(
+                f"threads: expected to start {self.threads}; got too few resources. Use fewer."
+            )
+        weakref.finalize(self, destroy, self._struct.threads)
+
+    @property
+    def populations(self) -> Floats:
+        """Populations after the last collision, less the weights of their directions.
+
+        Shape (9, ny, nx), a view of the present buffer: a step makes it the other one.
+        """
+        first, second = self._buffers
+        return first if self._struct.populations == _address(first) else second
+
+    @property
+    def shear_rate(self) -> float:
+        """Relaxation rate ω of the shear stress; may be set at any time."""
+        return float(self._struct.shear_rate)
+
+    @shear_rate.setter
+    def shear_rate(self, value: float) -> None:
+        if not 0.0 < np.float32(value) < 2.0:
+            raise ValueError(
+                f"shear_rate: expected a rate between 0 and 2 in single precision; got {value!r}. "
+                "It is 1/(3 viscosity + 1/2): use a positive viscosity, above 1e-7 cells² a step."
+            )
+        self._struct.shear_rate = value
+
+    @property
+    def stream(self) -> tuple[float, float]:
+        """Velocity of the undisturbed fluid [cells/step]; may be set at any time."""
+        return self._struct.stream[0], self._struct.stream[1]
+
+    @stream.setter
+    def stream(self, value: tuple[float, float]) -> None:
+        if not math.hypot(*value) <= MAX_SPEED:
+            raise ValueError(
+                f"stream: expected at most {MAX_SPEED} cells a step; got {value}. Use a shorter time step."
+            )
+        self._struct.stream[:] = value
+
+    @property
+    def force_rows(self) -> tuple[int, int]:
+        """First and past the last row of ``force`` that a step reads; the others count as zero."""
+        return self._struct.force_begin, self._struct.force_end
+
+    @force_rows.setter
+    def force_rows(self, value: tuple[int, int]) -> None:
+        if not 0 <= value[0] <= value[1] <= self.ny:
+            raise ValueError(f"force_rows: expected a range within 0 … {self.ny}; got {value}")
+        self._struct.force_begin, self._struct.force_end = value
+
+    def step(self, shift: tuple[int, int] = (0, 0)) -> None:
+        """Go on by one step.
+
+        Args:
+            shift: of the window, in cells: cell (i, j) is (i + shift[0], j + shift[1]) of the window before,
+                to which ``force`` belongs. What was outside of it is the stream.
+        """
+        self._step(self.struct_address, *shift)
+
+    def moments(self, stride: int = 1) -> Picture:
+        """Return the present state as means over blocks of ``stride`` × ``stride`` cells.
+
+        It is the state after the collision: where a force acted, half of it is too much in the velocity.
+
+        Raises:
+            ValueError: there would be less than two blocks along a side.
+        """
+        if not 1 <= stride <= min(self.nx, self.ny) // 2:
+            raise ValueError(f"stride: expected 1 … {min(self.nx, self.ny) // 2}; got {stride}")
+        velocity = np.empty((2, self.ny // stride, self.nx // stride), dtype=np.float32)
+        density = np.empty(velocity.shape[1:], dtype=np.float32)
+        self._moments(self.struct_address, stride, _address(velocity), _address(density))
+        vorticity = np.gradient(velocity[1], stride, axis=1) - np.gradient(velocity[0], stride, axis=0)
+        return Picture(velocity, density, vorticity)
+
+    def halve_step(self, shear_rate: float) -> None:
+        """Halve the time of a step; the cells and the physical fields stay as they are.
+
+        Velocities, ``stream`` included, become half, the density's difference from 1 a fourth, and the second
+        moments such that the physical stress stays. Where a force acted in the last step, half of it is in
+        the velocity and is treated like the rest.
+
+        Args:
+            shear_rate: the new ω, 4ω/(2 + ω) where the physical viscosity stays.
+
+        Raises:
+            ValueError: the new rate is out of its range, or the old one is 1: there the populations hold no
+                stress.
+        """
+        old = self.shear_rate
+        self.shear_rate = shear_rate  # checks it
+        new, self._struct.shear_rate = self.shear_rate, old
+        if self._halve_step(self.struct_address, new):
+            raise ValueError("halve_step: expected a shear_rate other than 1 before; got 1. Use 0.999.")
+
+    @property
+    def state(self) -> bytes:
+        """The whole state between two steps: ω, stream and populations; ``force`` is not part of it.
+
+        Setting it raises ValueError where the bytes are not of a lattice of this size.
+        """
+        return np.array([self.shear_rate, *self.stream], np.float32).tobytes() + self.populations.tobytes()
+
+    @state.setter
+    def state(self, value: bytes) -> None:
+        numbers = np.frombuffer(value, dtype=np.float32) if len(value) % 4 == 0 else np.empty(0)
+        if len(numbers) != 3 + self.populations.size:
+            raise ValueError(f"state: expected {12 + self.populations.nbytes} bytes; got {len(value)}")
+        self.shear_rate, self.stream = float(numbers[0]), (float(numbers[1]), float(numbers[2]))
+        self.populations[:] = numbers[3:].reshape(DIRECTIONS, self.ny, self.nx)
+
+
+def _check_size(nx: int, ny: int, fringe: int) -> None:
+    if fringe < 1:
+        raise ValueError(f"fringe: expected 1 or more layers; got {fringe}")
+    for name, size in (("nx", nx), ("ny", ny)):
+        if size < 2 * fringe + 8:
+            raise ValueError(f"{name}: expected at least 2 fringe + 8 = {2 * fringe + 8} cells; got {size}")
+
+
+def _aligned(count: int) -> Floats:
+    """Return zeros at the start of a cache line."""
+    memory = np.zeros(count + _ALIGNMENT // 4, dtype=np.float32)
+    start = -_address(memory) % _ALIGNMENT // 4
+    return memory[start : start + count]
+
+
+def _address(array: Floats) -> int:
+    return int(array.__array_interface__["data"][0])
