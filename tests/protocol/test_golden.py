@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import runpy
 from pathlib import Path
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 from google.protobuf.json_format import MessageToDict, ParseDict
 
+from linkwind.frames import decode
 from linkwind.messages import MotionMessage, WrenchMessage
 from linkwind.schema import MESSAGES
 
@@ -41,11 +43,22 @@ def vectors() -> dict[str, tuple[str, dict[str, Any]]]:
         "motion_final": ("MotionStep", {**step, "final": 1, "accepted": motion, "trial": motion}),
         "wrench": ("WrenchStep", {**wrench, **loads}),
         "wrench_added_inertia": ("WrenchStep", {**wrench, **loads, "addedInertia": numbers(72, 0.3)}),
+        "flow_frame": ("FlowFrame", flow_frame()),
         "hello": (
             "Control",
             {"hello": {"name": "aero", "schemaSha256": "00", "version": "0.1.0", "instance": "i"}},
         ),
     }
+
+
+def flow_frame() -> dict[str, Any]:
+    """Two rows of three cells; bytes are base64 in JSON."""
+    values = np.array(numbers(24, 0.25), "<f4")
+    parts = {"velocity": values[:12], "pressure": values[12:18], "vorticity": values[18:]}
+    arrays = {name: base64.b64encode(part.tobytes()).decode() for name, part in parts.items()}
+    where = {"cell": 0.1, "originX": -0.0, "originY": -1.25, "rows": 2, "columns": 3}
+    when = {"number": "4", "step": "120", "timeNs": "120000000"}
+    return {"run": "golden", "provider": "aero", **when, **where, **arrays}
 
 
 def write() -> None:
@@ -90,6 +103,15 @@ def test_motion_is_written_and_read_as_the_golden_bytes(name: str) -> None:
         name == "motion_final",
     )
     assert read.accepted.position.tobytes() == np.array(values["accepted"]["position"]).tobytes()
+
+
+def test_a_frame_is_written_and_read_as_the_golden_bytes() -> None:
+    values, encoded = golden("flow_frame")
+    number, frame = decode(encoded, "golden", "aero")
+    assert (number, frame.step, frame.time_ns, frame.shape) == (4, 120, 120_000_000, (2, 3))
+    assert (frame.cell, frame.origin) == (0.1, (-0.0, -1.25))
+    assert frame.vorticity.tobytes() == base64.b64decode(values["vorticity"])
+    assert frame.encode("golden", "aero", 4) == encoded
 
 
 @pytest.mark.parametrize("added", [False, True])

@@ -55,6 +55,8 @@ def serve(link: ProviderLink, provider: ProviderSession, start_timeout: float) -
         provider.started(link.request(provider.ready(), start_timeout))
         while provider.state is not ProviderState.DONE:
             answer = provider.answer(link.receive())
+            for frame in provider.frames():
+                link.show(frame)
             if answer is not None:
                 link.reply(answer)
     except Exception as error:

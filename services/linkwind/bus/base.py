@@ -1,8 +1,8 @@
 """What a transport has to offer: the two ends of the bus.
 
 A transport moves ``(key, bytes)`` and tells who is there; it knows no message but Fault. Keys are
-``linkwind/v1/<run>/motion``, ``…/wrench/<provider>``, ``…/control``, ``…/fault`` and
-``…/alive/<participant>``.
+``linkwind/v1/<run>/motion``, ``…/wrench/<provider>``, ``…/observe/flow/<provider>``, ``…/control``,
+``…/fault`` and ``…/alive/<participant>``.
 """
 
 from __future__ import annotations
@@ -43,6 +43,13 @@ class DynamicsLink(Protocol):
         """
         ...
 
+    def frames(self) -> list[tuple[str, bytes]]:
+        """Take the frames that have come, each with its provider, without waiting.
+
+        A frame that was sent before a wrench, or before a Bye, is there when that is.
+        """
+        ...
+
     def fault(self, payload: bytes) -> None:
         """Tell every provider that the run is over, and why."""
         ...
@@ -74,6 +81,10 @@ class ProviderLink(Protocol):
             LostError: the dynamics died or was stopped.
             FaultError: a participant reported that it cannot go on.
         """
+        ...
+
+    def show(self, frame: bytes) -> None:
+        """Send a frame to the dynamics."""
         ...
 
     def reply(self, wrench: bytes) -> None:

@@ -21,6 +21,7 @@ class InProcessLink:
         self._session = session
         self._providers = list(providers)
         self._answers: deque[tuple[str, bytes]] = deque()
+        self._frames: list[tuple[str, bytes]] = []
         self._trouble: FaultError | None = None
         try:
             for provider in self._providers:
@@ -46,6 +47,7 @@ class InProcessLink:
                 self._trouble = self._trouble or fault_error(provider.fault(error))
                 self._trouble.__cause__ = self._trouble.__cause__ or error
                 continue
+            self._frames += [(provider.name, frame) for frame in provider.frames()]
             if answer is None:
                 self._session.control(provider.bye())
             else:
@@ -60,6 +62,11 @@ class InProcessLink:
         if not self._answers and self._trouble is not None:
             raise self._trouble
         return self._answers.popleft()
+
+    def frames(self) -> list[tuple[str, bytes]]:
+        """Take the frames of the last answers."""
+        taken, self._frames = self._frames, []
+        return taken
 
     def fault(self, payload: bytes) -> None:
         """Nobody is left to be told."""

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
 
 from linkwind.coupling import CommunicationPoint
+from linkwind.frames import FlowFrame
 from linkwind.log.state import StateEncoder, StepEncoder, TimingEncoder
 from linkwind.mechanism import Mechanism
 from linkwind.native.multibody import Multibody
@@ -25,6 +27,8 @@ class MessageLog(Protocol):
     def step(self, payload: bytes, time_ns: int) -> None: ...
     def timing(self, payload: bytes, time_ns: int) -> None: ...
     def scene(self, time_ns: int, motion: Motion, wrench: Wrench) -> None: ...
+    def frame(self, provider: str, frame: FlowFrame) -> None: ...
+    def diagnostics(self, names: Mapping[str, Sequence[str]]) -> None: ...
 
 
 class Recorder:
@@ -43,6 +47,8 @@ class Recorder:
         self.force_max = 0.0
         self.motion = log.motion
         self.wrench = log.wrench
+        self.frame = log.frame
+        self.diagnostics = log.diagnostics
         self._log = log
         self._multibody = multibody
         self._step_ns = scenario.coupling.step_ns

@@ -96,6 +96,7 @@ class DynamicsService:
             # A state that blows up is stopped by the core, with a reason; the log shows the way there.
             with np.errstate(over="ignore", invalid="ignore"):
                 self._await_providers(poll)
+                recorder.diagnostics({p.name: p.diagnostics for p in self.session.participants.values()})
                 start = time.perf_counter()
                 final = self._march(progress)
                 wall = time.perf_counter() - start
@@ -162,11 +163,17 @@ class DynamicsService:
         took = time.perf_counter_ns() - start
         self._times.add(took)
         self._recorder.timing(step, motion.time_ns, took)
+        self._take_frames()
         return Answer(*session.total())
 
     def _write_pending(self) -> None:
         while self._pending:
             self._recorder.point(self._pending.popleft())
+
+    def _take_frames(self) -> None:
+        """Write the frames that came with the last answers: after all of these, whoever answered first."""
+        for provider, payload in sorted(self._link.frames(), key=lambda sent: sent[0]):
+            self._recorder.frame(provider, self.session.frame(provider, payload))
 
     def _say_goodbye(self, final: State, poll: Callable[[], None]) -> None:
         motion = self.session.motion
@@ -179,6 +186,8 @@ class DynamicsService:
         if not self._link.wait(lambda: not self.session.not_gone, GOODBYE_TIMEOUT, poll):
             missing = " and ".join(f'"{name}"' for name in self.session.not_gone)
             raise LostError(f"{missing} did not say Bye within {GOODBYE_TIMEOUT:g} s of the last step")
+        self._take_frames()
+        self.session.check_frames()
 
     def _digest(self, final: State) -> str:
         motion = Motion.at_rest(len(self.mechanism.bodies))

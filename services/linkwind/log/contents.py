@@ -14,6 +14,7 @@ PACKAGE = "linkwind.v1."
 
 MOTION, STATE, STEP, TIMING = "/motion", "/state", "/step", "/timing"
 WRENCH = "/wrench/"  # and the name of the provider
+FLOW = "/flow/"  # and the name of the provider: foxglove.Grid
 TRANSFORMS, SCENE = "/tf", "/scene"  # pictures for Foxglove, decimated
 
 MESSAGE_OF = {MOTION: "MotionStep", STATE: "State", STEP: "Step", TIMING: "Timing"}
@@ -22,6 +23,7 @@ SCENARIO = "scenario.json"  # attachment: the resolved scenario
 
 RUN = "linkwind"  # metadata: run id, bodies, schema hash and what the caller adds
 VERSIONS = "linkwind.versions"  # metadata: versions of the programs, processor
+DIAGNOSTICS = "linkwind.diagnostics"  # metadata: names of each provider's own numbers; missing without any
 END = "linkwind.end"  # metadata: how the run ended; missing when the writer was killed
 
 

@@ -7,10 +7,13 @@ import struct
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
 from google.protobuf.descriptor import FieldDescriptor
 from google.protobuf.message import DecodeError
 
-from linkwind.log import contents
+from linkwind.errors import LogError
+from linkwind.frames import COMPONENTS
+from linkwind.log import contents, grid
 from linkwind.schema import MESSAGES
 
 Value = float | int | str | None
@@ -137,6 +140,48 @@ class Finder:
         else:
             return None
         return names[place] if place < len(names) else None
+
+
+def between_frames(topic: str, step_ns: int, recorded: bytes, again: bytes) -> Difference:
+    """Return the first difference of two frames of a fluid that are not equal.
+
+    Args:
+        topic: that both belong to.
+        step_ns: communication step size [ns].
+        recorded: ``foxglove.Grid`` of the log.
+        again: of the run made again.
+    """
+    from foxglove.messages import Grid
+
+    kind = Grid.get_schema()
+    right = grid.decode(again, kind.name, kind.data, step_ns)
+    at = (topic, right.step, right.time_ns, 0)
+    try:
+        left = grid.decode(recorded, kind.name, kind.data, step_ns)
+    except LogError as error:
+        return Difference(*at, "encoding", None, None, str(error), "a frame", None)
+    for field in ("origin", "cell", *COMPONENTS):
+        one, other = (np.ascontiguousarray(getattr(frame, field)) for frame in (left, right))
+        if one.shape != other.shape:
+            return Difference(*at, field, None, None, str(one.shape), str(other.shape), None)
+        bits = [side.ravel().view(f"i{side.itemsize}") for side in (one, other)]
+        differing = np.flatnonzero(bits[0] != bits[1])
+        if differing.size:
+            i = int(differing[0])
+            values = one.flat[i].item(), other.flat[i].item()
+            distance = ulp(*values) if one.itemsize == 8 else _single_ulp(*(int(side[i]) for side in bits))
+            return Difference(*at, field, i if one.ndim else None, None, *values, distance)
+    lengths = (f"{len(recorded)} bytes", f"{len(again)} bytes")
+    return Difference(*at, "encoding", None, None, *lengths, None)
+
+
+def _single_ulp(one: int, other: int) -> int | None:
+    """Return the distance of two float32, given as the int32 of the same bits; None if one is not finite."""
+    sizes = one & 0x7FFF_FFFF, other & 0x7FFF_FFFF
+    if max(sizes) >= 0x7F80_0000:
+        return None
+    places = [bits if bits >= 0 else -size - 1 for bits, size in zip((one, other), sizes, strict=True)]
+    return abs(places[0] - places[1])
 
 
 def _differences(left: Any, right: Any, prefix: str) -> Iterator[tuple[str, int | None, tuple[Value, Value]]]:

@@ -13,59 +13,19 @@ from __future__ import annotations
 import json
 import mmap
 from collections.abc import Container, Iterator
+from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from google.protobuf.message import DecodeError
 
 from linkwind.errors import LogError
-from linkwind.log import contents, tables
+from linkwind.frames import FlowFrame
+from linkwind.log import contents, grid, tables
 from linkwind.log.chunks import MAGIC, ChannelInfo, Data, Message, chunk_records, messages_of
+from linkwind.log.facts import Damage, DecodedMessage, LogInfo, RawMessage
 from linkwind.log.scan import scan
 from linkwind.schema import MESSAGES
-
-
-class RawMessage(NamedTuple):
-    """A message as it was logged: topic, simulation time [ns], protobuf bytes."""
-
-    topic: str
-    time_ns: int
-    payload: bytes
-
-
-class DecodedMessage(NamedTuple):
-    """A message parsed: topic, simulation time [ns], protobuf message of ``linkwind.v1``."""
-
-    topic: str
-    time_ns: int
-    message: Any
-
-
-class Damage(NamedTuple):
-    """What is missing from a log.
-
-    Attributes:
-        bytes_lost: length of what cannot be read.
-        messages_lost: messages known to be missing; there were more where ``cut`` is set.
-        cut: the file ends without its summary, so that what came after its end is unknown.
-        text: where and why, for people.
-    """
-
-    bytes_lost: int
-    messages_lost: int
-    cut: bool
-    text: str
-
-
-class LogInfo(NamedTuple):
-    """What ``linkwind log info`` tells: name of the scenario, messages by topic, and their sum."""
-
-    messages: int
-    topics: dict[str, int]
-    steps: int
-    complete: bool
-    scenario: str
-    versions: dict[str, str]
 
 
 class Log:
@@ -90,9 +50,13 @@ class Log:
         counts = self._counts()
         self.topics = {self.channels[number].topic: counts[number] for number in sorted(counts)}
         self._check_schemas()
-        self.metadata: dict[str, str] = self._contents.metadata.get(contents.RUN, {})
-        self.versions: dict[str, str] = self._contents.metadata.get(contents.VERSIONS, {})
-        self.ending: dict[str, str] = self._contents.metadata.get(contents.END, {})
+        self.metadata = self.record(contents.RUN)
+        self.versions = self.record(contents.VERSIONS)
+        self.ending = self.record(contents.END)
+
+    def record(self, name: str) -> dict[str, str]:
+        """Return a metadata record, empty where there is none."""
+        return self._contents.metadata.get(name, {})
 
     def _check_origin(self) -> None:
         profile = self._contents.profile
@@ -165,6 +129,12 @@ class Log:
         providers = json.loads(self._known(self.metadata.get("provider_bodies"), "the list of providers"))
         return {name: tuple(bodies) for name, bodies in providers.items()}
 
+    @property
+    def diagnostics(self) -> dict[str, tuple[str, ...]]:
+        """Names of the numbers that each provider reports with its wrenches; those that have any."""
+        record = self.record(contents.DIAGNOSTICS)
+        return {provider: tuple(json.loads(names)) for provider, names in record.items()}
+
     def _known(self, value: str | None, what: str) -> str:
         if value is None:
             text = self.damage.text if self.damage else "a log without it"
@@ -234,6 +204,39 @@ class Log:
                 yield DecodedMessage(topic, time_ns, MESSAGES[name].FromString(payload))
             except DecodeError as error:
                 raise LogError(f"{self.path}: {topic}: expected a {name}; got {error}.") from error
+
+    @property
+    def flows(self) -> tuple[str, ...]:
+        """Providers of whose fluid there are frames."""
+        topics = (topic for topic in self.topics if topic.startswith(contents.FLOW))
+        return tuple(topic.removeprefix(contents.FLOW) for topic in topics)
+
+    def frames(self, provider: str) -> Iterator[FlowFrame]:
+        """Iterate over the frames of a provider's fluid, in order; one chunk of the file is in memory.
+
+        Raises:
+            LogError: a message is no such frame.
+        """
+        for channel, _, _, payload in self.messages(contents.FLOW + provider):
+            yield self._frame(channel, payload)
+
+    def as_sent(self, channel: int, number: int, payload: bytes) -> bytes:
+        """Return a message of :meth:`messages` as it was on the bus; a frame is logged in another form."""
+        topic = self.channels[channel].topic
+        if not topic.startswith(contents.FLOW):
+            return payload
+        return self._frame(channel, payload).encode(self.run, topic.removeprefix(contents.FLOW), number)
+
+    def _frame(self, channel: int, payload: bytes) -> FlowFrame:
+        topic, schema, _ = self.channels[channel]
+        try:
+            return grid.decode(payload, schema.name, schema.data, self._step_ns)
+        except LogError as error:
+            raise LogError(f"{self.path}: {topic}: {error}.") from error
+
+    @cached_property
+    def _step_ns(self) -> int:
+        return round(float(json.loads(self.scenario_json)["coupling"]["step"]) * 1e9)
 
     def columns(self, topic: str) -> dict[str, Any]:
         """Return the values of every field of a topic's messages, by dotted name, one row a message.

@@ -69,8 +69,8 @@ def recover(
 def _write(log: Log, file: IO[bytes], progress: Callable[[int], None]) -> int:
     writer = Writer(file, chunk_size=CHUNK_SIZE, compression=CompressionType.NONE, enable_data_crcs=True)
     writer.start(profile=contents.PROFILE, library="linkwind log recover")
-    for name, record in ((contents.RUN, log.metadata), (contents.VERSIONS, log.versions)):
-        if record:
+    for name in (contents.RUN, contents.VERSIONS, contents.DIAGNOSTICS):
+        if record := log.record(name):
             writer.add_metadata(name, contents.sealed(record))
     if log.has_scenario:
         writer.add_attachment(0, 0, contents.SCENARIO, "application/json", log.scenario_json.encode())

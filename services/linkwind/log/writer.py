@@ -18,10 +18,12 @@ from typing import Any
 from foxglove import Channel, Context, Schema, open_mcap
 from foxglove.channels import FrameTransformsChannel, SceneUpdateChannel
 from foxglove.mcap import MCAPWriteOptions
+from foxglove.messages import Grid
 
 from linkwind import schema
 from linkwind.errors import LogError
-from linkwind.log import contents
+from linkwind.frames import FlowFrame
+from linkwind.log import contents, grid
 from linkwind.log.scene import Scene
 from linkwind.log.sink import Sink
 from linkwind.log.versions import versions
@@ -122,16 +124,18 @@ class LogWriter:
         self._transforms = FrameTransformsChannel(contents.TRANSFORMS, context=self._context)
         self._scenes = SceneUpdateChannel(contents.SCENE, context=self._context)
         self._opened += [self._transforms, self._scenes]
+        self._flow: dict[str, Callable[[bytes, int], None]] = {}  # opened when there is a frame
 
-    def _channel(self, topic: str) -> Callable[[bytes, int], None]:
-        """Open a channel; return its method that logs a payload at a time, without the layers above."""
+    def _channel(self, topic: str, kind: Schema | None = None) -> Callable[[bytes, int], None]:
+        """Open a channel; return its method that logs a payload at a time, without the layers above.
+
+        Args:
+            topic: of linkwind's, which gives the message type, or another.
+            kind: the message type of another.
+        """
         name = f"{contents.PACKAGE}{contents.message_name(topic)}"
-        channel = Channel(
-            topic,
-            schema=Schema(name=name, encoding="protobuf", data=schema.DESCRIPTOR_SET),
-            message_encoding="protobuf",
-            context=self._context,
-        )
+        ours = Schema(name=name, encoding="protobuf", data=schema.DESCRIPTOR_SET)
+        channel = Channel(topic, schema=kind or ours, message_encoding="protobuf", context=self._context)
         self._opened.append(channel)
         return channel.base.log
 
@@ -173,6 +177,18 @@ class LogWriter:
         if due:
             self._transforms.log(self._scene.transforms(time_ns, motion), log_time=time_ns)
             self._scenes.log(self._scene.update(time_ns, motion, wrench), log_time=time_ns)
+
+    def frame(self, provider: str, frame: FlowFrame) -> None:
+        """Log a frame of the fluid that ``provider`` showed, at the frame's own time."""
+        if provider not in self._flow:
+            self._flow[provider] = self._channel(contents.FLOW + provider, Grid.get_schema())
+        self._flow[provider](grid.encode(frame), frame.time_ns)
+
+    def diagnostics(self, names: Mapping[str, Sequence[str]]) -> None:
+        """Record the names of the numbers that providers report with their wrenches; none, nothing."""
+        record = {provider: json.dumps(list(each)) for provider, each in names.items() if each}
+        if record:
+            self._writer.write_metadata(contents.DIAGNOSTICS, contents.sealed(record))
 
     def flush(self) -> None:
         """Bring every message so far into the file, where a killed process leaves it.

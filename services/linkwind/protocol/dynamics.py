@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from linkwind.errors import ProtocolError, SimulationError
+from linkwind.frames import FlowFrame, decode
 from linkwind.messages import MotionMessage
 from linkwind.protocol.handshake import HandShake
 from linkwind.spatial import Array
@@ -90,6 +91,33 @@ class DynamicsSession(HandShake):
         known.payload = payload
         self._waiting -= 1
         return True
+
+    def frame(self, provider: str, payload: bytes) -> FlowFrame:
+        """Take a frame.
+
+        Raises:
+            ProtocolError: unknown provider, not a frame of this run, or one before it was lost.
+        """
+        known = self.participants.get(provider)
+        if known is None:
+            raise ProtocolError(f'frame from "{provider}": it does not take part in run {self.run}')
+        number, frame = decode(payload, self.run, provider)
+        if number != known.frames + 1:
+            raise ProtocolError(
+                f'frame from "{provider}": {self.where()}: expected number {known.frames + 1}; got {number}. '
+                "A frame was lost."
+            )
+        known.frames = number
+        return frame
+
+    def check_frames(self) -> None:
+        """Raise ProtocolError unless all frames are here that the providers say they sent."""
+        for p in self.participants.values():
+            if p.frames != p.shown:
+                raise ProtocolError(
+                    f'frames from "{p.name}": expected {p.shown}, as its Bye says; got {p.frames}. '
+                    "The last ones were lost."
+                )
 
     def total(self) -> tuple[Array, Array | None]:
         """Add up the answers of all providers, in the scenario's order.

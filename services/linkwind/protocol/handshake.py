@@ -28,6 +28,8 @@ class Participant:
     message: WrenchMessage | None = None
     diagnostics: tuple[str, ...] = ()
     kind: str = "point"
+    frames: int = 0  # taken so far
+    shown: int = 0  # sent, as Bye says
 
     @property
     def answer(self) -> Wrench:
@@ -139,6 +141,7 @@ class HandShake:
     def _on_bye(self, message: Any) -> Any:
         if message.bye.name in self.participants:
             self.participants[message.bye.name].bye = True
+            self.participants[message.bye.name].shown = message.bye.frames
             self.participants[message.bye.name].answered = True
         return Control(start={})
 

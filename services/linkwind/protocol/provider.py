@@ -10,6 +10,7 @@ from typing import Protocol
 
 from linkwind import __version__
 from linkwind.errors import ProtocolError, RefusedError
+from linkwind.frames import FlowFrame
 from linkwind.messages import KINDS, MotionMessage, WrenchMessage
 from linkwind.protocol.control import Control, fault, parse
 from linkwind.schema import SHA256
@@ -72,6 +73,9 @@ class ProviderSession:
         self.at = (-1, 0)
         self._build = build
         self._close: Callable[[], None] = lambda: None
+        self._frame: Callable[[], FlowFrame | None] = lambda: None
+        self._frames: list[bytes] = []
+        self._shown = 0
         self._answer = b""
 
     def hello(self) -> bytes:
@@ -109,6 +113,7 @@ class ProviderSession:
         """
         self._model = self._build(self._scenario_json, self.name)
         self._close = getattr(self._model, "close", self._close)
+        self._frame = getattr(self._model, "frame", self._frame)
         can = self._model.capabilities
         self._wrench = WrenchMessage(
             self.run,
@@ -157,6 +162,7 @@ class ProviderSession:
         at = motion.at
         if motion.final:
             self._model.commit(motion.time_ns / 1e9, motion.accepted)
+            self._show()
             self.state = ProviderState.DONE
             return None
         if at <= self.at:
@@ -171,7 +177,26 @@ class ProviderSession:
         self._wrench.stamp(at[0], at[1], motion.time_ns)
         self.at = at
         self._answer = self._wrench.payload()
+        self._show()
         return self._answer
+
+    def _show(self) -> None:
+        """Encode the frame that the model has for us now, if it has one."""
+        frame = self._frame()
+        if frame is None:
+            return
+        if frame.time_ns != frame.step * self._step_ns:
+            raise ProtocolError(
+                f'"{self.name}": frame of step {frame.step}: expected time {frame.step * self._step_ns} ns; '
+                f"got {frame.time_ns}"
+            )
+        self._shown += 1
+        self._frames.append(frame.encode(self.run, self.name, self._shown))
+
+    def frames(self) -> list[bytes]:
+        """Take what the last :meth:`answer` has to show besides: to be sent before the answer itself."""
+        taken, self._frames = self._frames, []
+        return taken
 
     def _advance(self, step: int, iteration: int) -> None:
         """Commit the accepted state when the step is new, go back to it for another iteration."""
@@ -194,7 +219,7 @@ class ProviderSession:
 
     def bye(self) -> bytes:
         """Return the answer to the final motion."""
-        return bytes(Control(bye={"name": self.name}).SerializeToString())
+        return bytes(Control(bye={"name": self.name, "frames": self._shown}).SerializeToString())
 
     def close(self) -> None:
         """End what the force model holds, such as a process of its own."""

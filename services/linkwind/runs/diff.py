@@ -13,7 +13,7 @@ import numpy as np
 
 from linkwind.errors import LogError
 from linkwind.log.compare import FieldDifference, Matched, deviation, differences, match
-from linkwind.log.contents import MOTION, STATE, STEP, WRENCH
+from linkwind.log.contents import FLOW, MOTION, STATE, STEP, WRENCH
 from linkwind.log.difference import Difference, printable
 from linkwind.log.reader import Log, open_log
 from linkwind.mechanism import build
@@ -148,6 +148,12 @@ def _remarks(one: Log, other: Log) -> Iterator[str]:
     library = one.metadata.get("library_sha256"), other.metadata.get("library_sha256")
     if library[0] != library[1]:
         yield "made with: another build of the C library"
+    yield from _not_compared(one, other)
+
+
+def _not_compared(one: Log, other: Log) -> Iterator[str]:
+    for provider in sorted({*one.flows} & {*other.flows}):
+        yield f"{FLOW}{provider} is not compared"
     for topic in sorted(one.topics.keys() ^ other.topics.keys()):
         yield f"only {one.path if topic in one.topics else other.path} has {topic}"
 

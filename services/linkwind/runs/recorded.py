@@ -122,6 +122,10 @@ class RecordedWrenches:
                 at = (WRENCH + name, motion.at[0], motion.time_ns, motion.at[1])
                 raise DifferError(Difference(*at, field, None, None, was, asked, None))
 
+    def frames(self) -> list[tuple[str, bytes]]:
+        """Nobody is there to show any."""
+        return []
+
     def fault(self, payload: bytes) -> None:
         """Nobody is there to be told."""
 

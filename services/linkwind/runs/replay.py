@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from linkwind.errors import InputError, LostError
-from linkwind.log.contents import MOTION, WRENCH
+from linkwind.log.contents import FLOW, MOTION, WRENCH
 from linkwind.log.reader import Log
 from linkwind.scenario import from_json
 
@@ -124,7 +124,8 @@ def replay(
     _check(log, selection, topics)
     timeout = from_json(log.scenario_json).bus.start_timeout
     participants = ["dynamics", *log.provider_bodies]
-    with closing(ZenohPlayer(log.run, topics, participants, listen, connect)) as player:
+    keys = {topic: f"/observe{topic}" if topic.startswith(FLOW) else topic for topic in topics}
+    with closing(ZenohPlayer(log.run, keys, participants, listen, connect)) as player:
         if not player.wait(timeout, GRACE):
             raise LostError(
                 f"nobody subscribed to linkwind/v1/{log.run}/** within {timeout:g} s. Start the subscriber, "
@@ -147,6 +148,7 @@ def replay(
 def _topics(log: Log, selection: Selection) -> list[str]:
     """Return the topics to publish; states and diagnostics are in the log only."""
     there = [MOTION, *(f"{WRENCH}{name}" for name in log.provider_bodies)]
+    there += [f"{FLOW}{name}" for name in log.flows]
     unknown = [topic for topic in selection.topics if topic not in there]
     if unknown:
         raise InputError(
@@ -182,11 +184,12 @@ def _window(log: Log, selection: Selection, topics: Sequence[str]) -> Iterator[t
     """Yield what lies between start and end."""
     low = -1 if selection.start is None else round(selection.start * 1e9)
     high = math.inf if selection.end is None else round(selection.end * 1e9)
-    for topic, time_ns, payload in log.raw(*topics):
+    for channel, number, time_ns, payload in log.messages(*topics):
         if time_ns > high:
             return
         if time_ns >= low:
-            yield topic, time_ns, payload
+            topic = log.channels[channel].topic
+            yield topic, time_ns, log.as_sent(channel, number, payload)
 
 
 class _Pace:

@@ -6,7 +6,7 @@ soon as it is made, so that memory does not grow with the length of the run.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,8 +17,10 @@ from linkwind.bus.base import DynamicsLink
 from linkwind.dynamics.recorder import Recorder, tables_sha256
 from linkwind.dynamics.service import DynamicsService
 from linkwind.errors import LinkwindError, LogError
-from linkwind.log.contents import MOTION, STATE, STEP, WRENCH
-from linkwind.log.difference import Difference, Finder
+from linkwind.frames import FlowFrame
+from linkwind.log import grid
+from linkwind.log.contents import FLOW, MOTION, STATE, STEP, WRENCH
+from linkwind.log.difference import Difference, Finder, between_frames
 from linkwind.log.reader import Log, open_log
 from linkwind.log.versions import versions
 from linkwind.mechanism import Mechanism, build
@@ -136,7 +138,7 @@ class _Comparison:
 
     def __init__(self, log: Log, scenario: Scenario, mechanism: Mechanism, *, wrenches: bool) -> None:
         providers = [provider.name for provider in scenario.providers] if wrenches else []
-        topics = [MOTION, *(WRENCH + name for name in providers), STATE, STEP]
+        topics = [MOTION, *(kind + name for kind in (FLOW, WRENCH) for name in providers), STATE, STEP]
         self._recorded = {topic: Recorded(log, topic) for topic in topics}
         self._complete = log.complete
         self._step_ns = scenario.coupling.step_ns
@@ -165,6 +167,13 @@ class _Comparison:
     def scene(self, time_ns: int, motion: Motion, wrench: Wrench) -> None:
         """Pictures follow from the states."""
 
+    def frame(self, provider: str, frame: FlowFrame) -> None:
+        if provider in self._wrenches:
+            self._compare(FLOW + provider, grid.encode(frame), frame.time_ns)
+
+    def diagnostics(self, names: Mapping[str, Sequence[str]]) -> None:
+        """Names follow from the scenario and the program."""
+
     def _compare(self, topic: str, payload: bytes, time_ns: int) -> bool:
         """Hold a message against the recorded one; False if the file has lost that."""
         found = self._recorded[topic].take()
@@ -173,6 +182,8 @@ class _Comparison:
             return False
         _, _, recorded_ns, recorded = found
         if recorded != payload:
+            if topic.startswith(FLOW):
+                raise DifferError(between_frames(topic, self._step_ns, recorded, payload))
             raise DifferError(self._finder.between(topic, time_ns, recorded, payload))
         if recorded_ns != time_ns:
             at = (topic, time_ns // self._step_ns, time_ns, 0)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import zenoh
+from zenoh.handlers import FifoChannel
 
 from linkwind.bus.base import PREFIX
 from linkwind.bus.zenoh.endpoint import TICK, Endpoint
@@ -18,6 +19,7 @@ from linkwind.errors import AnswerTimeoutError, LinkwindError, LostError
 # s that the dynamics looks for an answer before it sleeps: a processor that is awake answers two to four
 # times faster. Only one side may do so, and only if it does not take the other's processor away.
 SPIN = 200e-6 if len(os.sched_getaffinity(0)) > 1 else 0.0
+FRAMES = 64  # that may wait for the dynamics, which takes them at every exchange
 FIRST_RESEND = 0.5  # s; the first motion may be lost while declarations still travel
 
 
@@ -61,6 +63,8 @@ class ZenohDynamicsLink(Endpoint):
         self._first_motion = b""
         self._resend_at: float | None = None
         self._changed = threading.Condition()
+        # Before the wrenches' own: whoever can send a wrench can send a frame.
+        self._shown = self._session.declare_subscriber(f"{base}/observe/flow/*", FifoChannel(FRAMES))
         self._join(f"{base}/wrench/*", f"{base}/motion", session.run, "dynamics")
         self._control = self._session.declare_queryable(f"{base}/control", self._on_control, complete=True)
 
@@ -127,4 +131,19 @@ class ZenohDynamicsLink(Endpoint):
         self._waiting_since = time.monotonic()
         sample = self._receive(SPIN)
         self._waiting_since = float("inf")
-        return str(sample.key_expr).rsplit("/", 1)[1], sample.payload.to_bytes()
+        return _named(sample)
+
+    def frames(self) -> list[tuple[str, bytes]]:
+        """Take the frames that have come; see :class:`~linkwind.bus.base.DynamicsLink`.
+
+        One session sends frame and wrench over one link, with one priority: zenoh keeps their order.
+        """
+        taken = []
+        while (sample := self._shown.try_recv()) is not None:
+            taken.append(_named(sample))
+        return taken
+
+
+def _named(sample: zenoh.Sample) -> tuple[str, bytes]:
+    """Return the provider that a sample comes from, and its payload."""
+    return str(sample.key_expr).rsplit("/", 1)[1], sample.payload.to_bytes()

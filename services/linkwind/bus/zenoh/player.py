@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import zenoh
@@ -19,7 +19,7 @@ class ZenohPlayer:
     def __init__(
         self,
         run: str,
-        topics: Sequence[str],
+        keys: Mapping[str, str],
         participants: Sequence[str],
         listen: Sequence[str],
         connect: Sequence[str],
@@ -28,7 +28,7 @@ class ZenohPlayer:
 
         Args:
             run: id of the run.
-            topics: that will be published, such as ``/motion``.
+            keys: of the topics that will be published, below that of the run, such as ``/motion``.
             participants: dynamics and providers.
             listen: zenoh endpoints to listen on.
             connect: zenoh endpoints to connect to.
@@ -44,9 +44,9 @@ class ZenohPlayer:
         )
         self._publishers = {
             topic: self._session.declare_publisher(
-                f"{base}{topic}", congestion_control=zenoh.CongestionControl.BLOCK, express=True
+                f"{base}{key}", congestion_control=zenoh.CongestionControl.BLOCK, express=True
             )
-            for topic in topics
+            for topic, key in keys.items()
         }
         liveliness = self._session.liveliness()
         self._tokens = [liveliness.declare_token(f"{base}/alive/{name}") for name in participants]

@@ -61,9 +61,11 @@ class ZenohProviderLink(Endpoint):
         """Take part in ``run``: from now on motion messages come in."""
         self._run = key_segment(run, "--run")
         self._joined_at = time.monotonic()
-        self._join(
-            f"{PREFIX}/{run}/motion", f"{PREFIX}/{run}/wrench/{key_segment(name, '--name')}", run, name
+        base, name = f"{PREFIX}/{run}", key_segment(name, "--name")
+        self._frames = self._session.declare_publisher(
+            f"{base}/observe/flow/{name}", congestion_control=zenoh.CongestionControl.BLOCK
         )
+        self._join(f"{base}/motion", f"{base}/wrench/{name}", run, name)
 
     def _seen(self, name: str, present: bool) -> None:
         if name == "dynamics":
@@ -81,6 +83,10 @@ class ZenohProviderLink(Endpoint):
     def receive(self) -> bytes:
         """Return the next motion message; see :class:`~linkwind.bus.base.ProviderLink`."""
         return self._receive().payload.to_bytes()
+
+    def show(self, frame: bytes) -> None:
+        """Send a frame to the dynamics."""
+        self._frames.put(frame)
 
     def reply(self, wrench: bytes) -> None:
         """Send a wrench message to the dynamics."""
