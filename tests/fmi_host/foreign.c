@@ -4,12 +4,18 @@
  * DERIVATIVES(m), INDICATORS(m), TOKEN, and what else a test wants. Values are m->v[offset].
  */
 #include <math.h>
+#ifndef _WIN32
 #include <signal.h>
+#endif
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#ifdef _WIN32
+__declspec(dllimport) void Sleep(unsigned long milliseconds);
+#else
 #include <unistd.h>
+#endif
 
 #if FMI == 2
 #include "fmi2Functions.h"

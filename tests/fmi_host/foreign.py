@@ -6,6 +6,7 @@ import functools
 import math
 import os
 import subprocess
+import sys
 import tempfile
 import zipfile
 from dataclasses import dataclass, field
@@ -14,9 +15,12 @@ from xml.sax.saxutils import quoteattr
 
 import fmpy
 
+from linkwind.fmi import toolchain, windows
+
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 SOURCE = Path(__file__).with_name("foreign.c")
 PLATFORM = {2: "linux64", 3: fmpy.platform_tuple}
+WINDOWS = {2: "win64", 3: "x86_64-windows"}
 UNITS = {
     "km/h": f'm="1" s="-1" factor="{1 / 3.6!r}"',
     "kN": 'kg="1" m="1" s="-2" factor="1000"',
@@ -69,15 +73,16 @@ class Foreign:
         return f"m->v[{self.offsets()[names.index(name)]}]"
 
 
-def fmu(folder: Path, foreign: Foreign, name: str = "foreign") -> Path:
-    """Build the FMU and return its file."""
+def fmu(folder: Path, foreign: Foreign, name: str = "foreign", *, windows: bool = False) -> Path:
+    """Build the FMU, for this platform or for Windows, and return its file."""
     path = folder / f"{name}.fmu"
     description = (_description2 if foreign.fmi == 2 else _description3)(foreign)
+    binary, make = f"{PLATFORM[foreign.fmi]}/foreign.so", library
+    if windows:
+        binary, make = f"{WINDOWS[foreign.fmi]}/foreign.dll", windows_library
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", description)
-        archive.writestr(
-            f"binaries/{PLATFORM[foreign.fmi]}/foreign.so", library(foreign.fmi, header(foreign))
-        )
+        archive.writestr(f"binaries/{binary}", make(foreign.fmi, header(foreign)))
         for entry, data in foreign.extra.items():
             archive.writestr(entry, data)
     return path
@@ -126,6 +131,25 @@ def library(fmi: int, text: str) -> bytes:
         command = [os.environ.get("CC", "cc"), *flags, "-o", str(target), str(SOURCE), "-lm"]
         subprocess.run(command, check=True)
         return target.read_bytes()
+
+
+@functools.cache
+def windows_library(fmi: int, text: str) -> bytes:
+    """Compile foreign.c for Windows, on its own runtime alone: zig would make another one first."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "foreign.h").write_text(text)
+        (folder / "more.def").write_text("LIBRARY ucrtbase.dll\nEXPORTS\nabort\n_exit\nputs\nfflush\n")
+        (folder / "kernel32.def").write_text("LIBRARY kernel32.dll\nEXPORTS\nSleep\n")
+        zig = [sys.executable, "-m", "ziglang"]
+        runtime = windows.prepare(folder)
+        for library_ in ("more", "kernel32"):
+            make = ["dlltool", "-m", "i386:x86-64", "-d", f"{library_}.def", "-l", f"lib{library_}.a"]
+            toolchain.run([*zig, *make], folder, "an import library")
+        flags = ["-target", "x86_64-windows-gnu", "-shared", "-O1", "-s", "-ffp-contract=off", f"-DFMI={fmi}"]
+        sources = ["-I.", f"-I{HEADERS}", str(SOURCE), *runtime, "libmore.a", "libkernel32.a"]
+        toolchain.run([*zig, "cc", *flags, "-o", "foreign.dll", *sources], folder, "foreign.dll")
+        return (folder / "foreign.dll").read_bytes()
 
 
 def _units(foreign: Foreign) -> str:

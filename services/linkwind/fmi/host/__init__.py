@@ -13,6 +13,7 @@
 ``planning``        from abilities and settings to a plan
 ``plan``            what a worker has to know
 ``library``         FMPy's classes: every call marked and checked
+``remote``          the library in another process, ``wine`` for libraries of Windows
 ``binding``         one instance, FMI 2 and 3 alike
 ``cosimulation``    stepping
 ``modelexchange``   integrating

@@ -15,6 +15,7 @@ from platform import machine
 from xml.parsers import expat
 
 from linkwind.errors import InputError
+from linkwind.fmi.host import wine
 
 DESCRIPTION = "modelDescription.xml"
 MAX_ENTRIES = 20_000
@@ -26,11 +27,14 @@ _BLOCK = 1 << 20
 
 _MACHINES = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}
 _FMI2_PLATFORMS = {"x86_64-linux": "linux64", "x86_64-darwin": "darwin64", "x86_64-windows": "win64"}
+_PE_X86_64 = b"PE\0\0\x64\x86"
 _ELF_MACHINES = {"x86_64": 62, "aarch64": 183}
 
 
-def platform_name(version: int) -> str:
-    """Return the folder of this platform's binaries in an FMU of FMI ``version``."""
+def platform_name(version: int, *, windows: bool = False) -> str:
+    """Return the folder of this platform's, or of Windows' binaries in an FMU of FMI ``version``."""
+    if windows:
+        return "win64" if version == 2 else "x86_64-windows"
     system = "darwin" if sys.platform == "darwin" else "windows" if sys.platform == "win32" else "linux"
     name = f"{_MACHINES.get(machine().lower(), machine().lower())}-{system}"
     return _FMI2_PLATFORMS.get(name, name) if version == 2 else name
@@ -152,8 +156,11 @@ class Archive:
         sources = any(name.startswith("sources/") and name.endswith(".c") for name in self.names)
         return sorted(found) + ["sources"] * sources
 
-    def library(self, version: int, identifier: str) -> str:
-        """Return the entry of the shared library for this platform.
+    def library(self, version: int, identifier: str) -> tuple[str, bool]:
+        """Return the entry of the shared library for this platform, or for Windows if there is no other.
+
+        Returns:
+            the entry's name, and whether it is for Windows.
 
         Raises:
             InputError: there is none, or it is made for another machine.
@@ -165,35 +172,45 @@ class Archive:
             raise self._refuse("a modelIdentifier of letters, digits and _", f"{identifier!r}")
         suffix = {"darwin": "dylib", "win32": "dll"}.get(sys.platform, "so")
         name = f"binaries/{platform_name(version)}/{identifier}.{suffix}"
+        for_windows = f"binaries/{platform_name(version, windows=True)}/{identifier}.dll"
+        windows = name not in self.names and for_windows in self.names and machine() == "x86_64"
+        if windows and not wine.needed():
+            name = for_windows
         if name not in self.names:
-            raise self._refuse(f"{name}", f"binaries for {self._have()}", self._advice(version))
+            advice = self._advice(version, runs_in_wine=windows)
+            raise self._refuse(f"{name}", f"binaries for {self._have()}", advice)
         with self._zip.open(name) as file:
-            header = file.read(20)
-        machine_code = _ELF_MACHINES.get(_MACHINES.get(machine().lower(), ""))
-        if suffix == "so" and (
-            header[:4] != b"\x7fELF" or int.from_bytes(header[18:20], "little") != machine_code
-        ):
+            self._check_library(name, file.read(4096))
+        return name, windows
+
+    def _check_library(self, name: str, head: bytes) -> None:
+        if name.endswith(".so"):
+            code = _ELF_MACHINES.get(_MACHINES.get(machine().lower(), ""))
+            right = head[:4] == b"\x7fELF" and int.from_bytes(head[18:20], "little") == code
+        else:
+            at = int.from_bytes(head[60:64], "little")
+            right = not name.endswith(".dll") or (head[:2] == b"MZ" and head[at : at + 6] == _PE_X86_64)
+        if not right:
             raise self._refuse(f"{name} to be a shared library for this machine", "another file")
-        return name
 
     def _have(self) -> str:
         return ", ".join(name for name in self.platforms() if name != "sources") or "no platform"
 
-    def _advice(self, version: int) -> str:
+    def _advice(self, version: int, *, runs_in_wine: bool) -> str:
         platforms = self.platforms()
         if "sources" in platforms:
             return f"It carries its C sources; build them with: python -m fmpy compile {self.path}"
-        if any("win" in name for name in platforms if "darwin" not in name):
-            return "A Windows FMU runs on Windows only (wine is not used). Ask its author for a Linux binary."
+        if runs_in_wine:
+            return f"It has only Windows binaries: to run these, install {wine.needed()}."
         return f"Ask its author for a binary for {platform_name(version)}."
 
-    def unpack(self, version: int, folder: Path) -> None:
-        """Write model description, binaries of this platform and resources below ``folder``.
+    def unpack(self, version: int, folder: Path, *, windows: bool = False) -> None:
+        """Write model description, binaries of this platform (or Windows) and resources below ``folder``.
 
         Raises:
             InputError: an entry is damaged or larger than it says.
         """
-        wanted = (DESCRIPTION, f"binaries/{platform_name(version)}/", "resources/")
+        wanted = (DESCRIPTION, f"binaries/{platform_name(version, windows=windows)}/", "resources/")
         (folder / "resources").mkdir(parents=True, exist_ok=True)  # FMUs are told its path
         for entry in self._zip.infolist():
             target = folder / entry.filename

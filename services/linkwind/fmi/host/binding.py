@@ -26,8 +26,10 @@ class Binding:
         version: of FMI.
     """
 
-    def __init__(self, plan: Plan, number: int, memory: mmap.mmap, mark: Marker, log: Log) -> None:
-        """Load the library and instantiate.
+    def __init__(
+        self, plan: Plan, number: int, memory: mmap.mmap, mark: Marker, log: Log, library: Any = None
+    ) -> None:
+        """Load the library, unless it is loaded in another process, and instantiate.
 
         Raises:
             CallError: the library cannot be loaded, or the FMU refuses.
@@ -43,7 +45,7 @@ class Binding:
             "instanceName": self._name,
         }
         try:
-            self.fmu: Any = CLASSES[plan.version, plan.interface](**arguments)
+            self.fmu: Any = CLASSES[plan.version, plan.interface](library=library, **arguments)
         except Exception as error:
             raise CallError(" ".join(str(error).split())) from None
         self.fmu.mark = mark

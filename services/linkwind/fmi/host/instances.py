@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -11,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from linkwind.errors import InputError, SimulationError
+from linkwind.fmi.host import wine
 from linkwind.fmi.host.archive import Archive
 from linkwind.fmi.host.description import Description
 from linkwind.fmi.host.links import Mapping
@@ -19,6 +21,8 @@ from linkwind.fmi.host.planning import interface, plan
 from linkwind.fmi.host.process import WorkerProcess
 from linkwind.scenario.providers import FmuModel
 from linkwind.spatial import Array
+
+_log = logging.getLogger("linkwind.fmu")
 
 
 class Worker(Protocol):
@@ -78,8 +82,8 @@ class Instances:
         self._closing = contextlib.ExitStack()
         try:
             folder = Path(self._closing.enter_context(TemporaryDirectory(prefix="linkwind-fmu-")), "fmu")
-            self._unpack(settings, folder)
-            whole = plan(fmu, mapping, settings, tuple(names), step_ns, folder)
+            library, caller = self._unpack(settings, folder)
+            whole = plan(fmu, mapping, settings, tuple(names), step_ns, folder, library, caller)
             self.can_save = whole.state != "none"
             self._parts = [
                 self._start(part, settings, timeout, first) for first, part in _shares(fmu, settings, whole)
@@ -98,14 +102,28 @@ class Instances:
             self.accepted, self.inputs = np.zeros(shape[0]), np.zeros(shape[0])
             self.outputs = np.zeros(shape[1])
 
-    def _unpack(self, settings: FmuModel, folder: Path) -> None:
+    def _unpack(self, settings: FmuModel, folder: Path) -> tuple[str, tuple[str, ...]]:
+        """Unpack; return the library's place below the folder, and the command that calls it elsewhere."""
         _, can = interface(self._fmu, settings)
         archive = Archive(self._fmu.path)
         try:
-            archive.library(self._fmu.version, can.identifier)
-            archive.unpack(self._fmu.version, folder)
+            library, windows = archive.library(self._fmu.version, can.identifier)
+            archive.unpack(self._fmu.version, folder, windows=windows)
         finally:
             archive.close()
+        return library, self._wine(settings, folder.parent) if windows else ()
+
+    def _wine(self, settings: FmuModel, folder: Path) -> tuple[str, ...]:
+        """Set up Wine for a library that only Windows can load; return the command that calls it."""
+        if settings.isolation == "inprocess":
+            raise InputError(
+                f"{self._fmu.path}: fmu.isolation: expected process, because the FMU has only Windows "
+                "binaries; got inprocess. Remove it."
+            )
+        found = wine.Wine(folder)
+        self._closing.callback(found.close)
+        _log.info("%s: only Windows binaries, run by %s", self._fmu.path, found.command[0])
+        return found.command
 
     def _start(self, part: Plan, settings: FmuModel, timeout: float, first: int) -> _Part:
         worker: Worker

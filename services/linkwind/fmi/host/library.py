@@ -45,13 +45,22 @@ class _Checked:
 
     mark: Callable[[str], None]
 
+    def __init__(self, library: Any = None, **arguments: Any) -> None:
+        """Load the library, unless one is given that has been loaded in another process."""
+        if library is None:
+            super().__init__(**arguments)
+            return
+        vars(self).update(arguments, dll=library, fmiCallLogger=None, component=None, callbacks=None)
+        self._functions: dict[str, Any] = {}
+        self._loadFunctions()
+
     def _loadFunctions(self) -> None:  # noqa: N802  FMPy's name
         self.dll: Any = _Library(self.dll)
         super()._loadFunctions()  # type: ignore[misc]
 
     def _call(self, name: str, *arguments: Any) -> Any:
         self.mark(name)
-        result = self._functions[name](*arguments)  # type: ignore[attr-defined]
+        result = self._functions[name](*arguments)
         if result.__class__ is int and result > 1 and "Instantiate" not in name:
             got = STATUS[result] if result < len(STATUS) else f"status {result}"
             raise CallError(f"{name} returned {got}")

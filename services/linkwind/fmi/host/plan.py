@@ -30,6 +30,8 @@ class Plan:
         version: of FMI, 2 or 3.
         interface: ``cs`` or ``me``.
         instances: names of the instances, which all do the same.
+        caller: the command of a process that calls the library for the worker; () for the worker itself.
+        library: path of the shared library below the folder.
         structural, start, held: values to set in configuration mode, before initialisation, and in
             initialisation mode (those of inputs that are not exchanged).
         inputs, outputs: value references of the variables that are exchanged.
@@ -51,6 +53,8 @@ class Plan:
     interface: Literal["cs", "me"]
     identifier: str
     token: str
+    caller: tuple[str, ...]
+    library: str
     instances: tuple[str, ...]
     structural: tuple[Setting, ...]
     start: tuple[Setting, ...]
@@ -80,7 +84,7 @@ class Plan:
         data = json.loads(text)
         for key in ("structural", "start", "held"):
             data[key] = tuple(Setting(**{**entry, "values": tuple(entry["values"])}) for entry in data[key])
-        for key in ("instances", "inputs", "outputs", "log_categories"):
+        for key in ("caller", "instances", "inputs", "outputs", "log_categories"):
             data[key] = tuple(data[key])
         return cls(**data)
 

@@ -71,8 +71,10 @@ def plan(
     instances: tuple[str, ...],
     step_ns: int,
     folder: Path,
+    library: str,
+    caller: tuple[str, ...] = (),
 ) -> Plan:
-    """Return what a worker needs to know.
+    """Return what a worker needs to know; for the arguments see ``Plan``.
 
     Raises:
         InputError: a start value does not fit its variable.
@@ -87,6 +89,8 @@ def plan(
         interface=kind,
         identifier=can.identifier,
         token=fmu.token,
+        caller=caller,
+        library=library,
         instances=instances,
         structural=tuple(_setting(fmu, name, value) for name, value in settings.structural.items()),
         start=tuple(setting for name, setting in given.items() if name not in inputs),

@@ -24,6 +24,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from linkwind.errors import SimulationError
+from linkwind.fmi.host import wine
 from linkwind.fmi.host.channel import ANSWER, REQUEST, receive
 from linkwind.fmi.host.following import Follower
 from linkwind.fmi.host.plan import Marker, Plan
@@ -113,6 +114,8 @@ class WorkerProcess:
 
     def _start(self, channel: int, shared: int, output: int) -> subprocess.Popen[bytes]:
         environment = {k: v for k, v in os.environ.items() if not k.startswith(_WITHHELD)}
+        if self._plan.caller:
+            environment = wine.environment(Path(self._plan.folder).parent, environment)
         environment |= {"OPENBLAS_NUM_THREADS": "1", "PYTHONUNBUFFERED": "1"}
         arguments = [channel, shared, os.getpid()]
         return subprocess.Popen(

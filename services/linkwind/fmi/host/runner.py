@@ -6,6 +6,7 @@ import mmap
 import struct
 from collections.abc import Callable
 from enum import Enum, auto
+from pathlib import Path
 from typing import Any
 
 from linkwind.fmi.host.binding import Binding
@@ -39,14 +40,25 @@ class Runner:
         self._plan = plan
         self._memory = memory
         self._mark = Marker(memory)
+        library = self._elsewhere(plan) if plan.caller else None
         self._bindings = [
-            Binding(plan, number, memory, self._mark, log) for number in range(len(plan.instances))
+            Binding(plan, number, memory, self._mark, log, library) for number in range(len(plan.instances))
         ]
         self._steppers = [_STEPPERS[plan.interface](binding, plan) for binding in self._bindings]
         self._kept: dict[int, list[Any]] = {}
         self._next_kept = 0
         self._now = self._start = 0
         self._configure()
+
+    def _elsewhere(self, plan: Plan) -> Any:
+        """Return the library in a process of its own."""
+        from linkwind.fmi.host.remote import Connection, RemoteLibrary
+
+        self._mark("dlopen")
+        path = Path(plan.folder, plan.library)
+        connection = Connection(plan.caller, path.parent)
+        connection.limit(plan.memory)
+        return RemoteLibrary(connection, path)
 
     def _configure(self) -> None:
         for binding in self._bindings:

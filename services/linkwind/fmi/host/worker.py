@@ -36,7 +36,6 @@ def _limit_memory(more: int) -> None:
     pages = int(Path("/proc/self/statm").read_text().split()[0]) if sys.platform == "linux" else 0
     limit = pages * resource.getpagesize() + more
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 def _log(line: str) -> None:
@@ -53,7 +52,9 @@ class Server:
     def begin(self, text: bytes) -> None:
         """Take the plan: limit the memory, load and instantiate."""
         plan = Plan.from_json(text)
-        _limit_memory(plan.memory)
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        if not plan.caller:  # else the FMU is in a process of its own, which has the limit
+            _limit_memory(plan.memory)
         self._runner = Runner(plan, self._memory, _log)
 
     def answer(self, what: bytes, number: int, payload: bytes) -> bytes:
