@@ -90,6 +90,36 @@ def test_memory_of_a_spring_damper_and_going_back(host, fmi, isolation):
 
 
 @both
+@isolations
+def test_an_evaluation_again_starts_from_the_last_commit(host, fmi, isolation):
+    """With and without serialisation of its state: what the first trial left behind is gone."""
+    for attributes in (STATE, STATE.replace(' canSerializeFMUstate="true"', "")):
+        hosted = host(replace(LAG, fmi=fmi, attributes=attributes), f'isolation = "{isolation}"')
+        lag = 0.0
+        for k in range(8):
+            hosted.motion.position[0, 0] = 2.0
+            expected = lag if k == 0 else 2.0 + (lag - 2.0) * np.exp(-0.1)
+            first = hosted.step(k)[0][0]
+            assert first == pytest.approx(-100.0 * expected, rel=1e-12)
+            for trial in (-1.0, 5.0):
+                hosted.motion.position[0, 0] = trial
+                lag_then = lag if k == 0 else trial + (lag - trial) * np.exp(-0.1)
+                assert hosted.at(k)[0][0] == pytest.approx(-100.0 * lag_then, rel=1e-12)
+            hosted.motion.position[0, 0] = 2.0
+            assert hosted.at(k)[0][0] == first
+            lag = expected
+
+
+def test_an_evaluation_again_without_state_takes_the_new_inputs(host):
+    hosted = host(DRAG)
+    for k in range(3):
+        hosted.motion.linear[0, 0] = 1.0
+        assert hosted.step(k)[0][0] == -2.0
+        hosted.motion.linear[0, 0] = 3.0
+        assert hosted.at(k)[0][0] == -6.0
+
+
+@both
 def test_a_checkpoint_goes_to_another_process(host, tmp_path, fmi):
     file = fmu(tmp_path, replace(LAG, fmi=fmi))
     first, second = host(file), host(file)

@@ -67,6 +67,7 @@ def test_holding_survives_going_back(host):
             hosted.at(k)
             hosted.model.restore(blob)
         seen.append(hosted.at(k)[0][0])
+        assert hosted.at(k)[0][0] == seen[-1]
     assert seen == [0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0]
 
 
@@ -187,6 +188,10 @@ def test_model_exchange_goes_back(host, fmi, isolation):
     hosted.motion.linear[0, 0] = 1.0
     hosted.model.restore(blob)
     hosted.model.commit(4 * hosted.h, hosted.motion)
+    assert hosted.at(5)[0][0] == first
+    hosted.motion.linear[0, 0] = -1.0
+    assert hosted.at(5)[0][0] != first
+    hosted.motion.linear[0, 0] = 1.0
     assert hosted.at(5)[0][0] == first
 
 

@@ -73,8 +73,9 @@ def _table(fmu: description.Description, found: Mapping, scenario: Scenario, pro
 class ForceFmu:
     """Forces from an FMU.
 
-    Committing changes nothing in the FMU: it is stepped by ``evaluate``, with the trial motion, and so its
-    memory follows the trials. ``save`` and ``restore`` bring it back where it has FMU state.
+    The FMU is stepped by ``evaluate``, with the trial motion, and so its memory follows the trials. An
+    evaluation without a commit before it is the same one again: it starts from the memory at the last commit
+    where the FMU has state; else the FMU only gets the new inputs.
     """
 
     def __init__(self, scenario: Scenario, provider: Provider, file: Path | None) -> None:
@@ -107,8 +108,7 @@ class ForceFmu:
         own = own_step_ns(self._fmu, settings, step_ns)
         self._me = interface(self._fmu, settings)[0] == "me"
         self._step_ns, self._begun = step_ns, False
-        self._memory: list[bytes] | None = None  # of the FMU after the last evaluation, once asked for
-        self._saves = False
+        self._again = False  # whether the last call was an evaluation
         self.capabilities = Capabilities(
             rollback=self._instances.can_save,
             added_inertia=any(link.quantity == "added_inertia" for link in found.outputs),
@@ -118,6 +118,7 @@ class ForceFmu:
 
     def commit(self, t: float, motion: Motion) -> None:
         """Remember the accepted motion, where an input or the integration needs it."""
+        self._again = False
         if self._me:
             self._inputs.fill(t, motion, self._instances.accepted)
         if self._inputs.remembers:
@@ -134,7 +135,8 @@ class ForceFmu:
         if not self._begun:
             instances.accepted[:] = instances.inputs
             self._begun = True
-        self._memory = instances.evaluate(round(t * 1e9), save=self._saves) or None
+        instances.evaluate(round(t * 1e9), again=self._again)
+        self._again = True
         if not np.isfinite(instances.outputs).all():
             raise self._not_finite(t)
         self._outputs.wrench(instances.outputs, motion, wrench)
@@ -158,10 +160,7 @@ class ForceFmu:
         """
         if not self._instances.can_save:
             raise SimulationError(f"{self._fmu.path}: expected an FMU with FMU state; got one without.")
-        if self._memory is None or not self._saves:
-            self._saves = True
-            self._memory = self._instances.save()
-        parts = [self._inputs.save(), *self._memory]
+        parts = [self._inputs.save(), *self._instances.save()]
         digest = bytes.fromhex(self._fmu.sha256)
         head = struct.pack(f"<8s32sI{len(parts)}I", _MAGIC, digest, len(parts), *map(len, parts))
         return b"".join([head, *parts])
@@ -189,7 +188,7 @@ class ForceFmu:
             begin += size
         self._inputs.restore(parts[0])
         self._instances.restore(parts[1:])
-        self._memory = parts[1:]
+        self._again = False
 
     def close(self) -> None:
         """End the FMU's process and remove what was unpacked."""

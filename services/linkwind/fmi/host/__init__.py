@@ -28,5 +28,5 @@ Time in the lock step: the first evaluation reads the outputs in initialisation 
 from the last communication point to the new one, with the motion of the new point as inputs, held over the
 step (Co-Simulation), or running linearly from the accepted to the new motion (Model Exchange). For a force
 without memory that is the force at the new point. What the FMU remembers follows the trial motion; where it
-has FMU state, an iteration goes back first.
+has FMU state, the same evaluation again goes back first, to before the step.
 """

@@ -6,8 +6,8 @@ A request is a letter, a number, the length of what follows, and what follows:
 letter meaning                   number, what follows
 ====== ========================= ======================
 ``p``  take the plan, load       -, the plan as JSON
-``s``  evaluate                  time [ns], -
-``S``  evaluate, then save       time [ns], -
+``s``  evaluate the next point   time [ns], -
+``a``  evaluate it again         time [ns], -
 ``v``  save                      -, -
 ``r``  restore                   -, what save returned
 ``c``  close the instances       -, -

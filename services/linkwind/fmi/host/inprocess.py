@@ -33,11 +33,10 @@ class InProcess:
         self._open = False
         return SimulationError(f"{error}{last_lines(self._lines)}")
 
-    def evaluate(self, time_ns: int, *, save: bool) -> bytes:
-        """Bring the outputs to the time [ns]; return all memory afterwards if asked to."""
+    def evaluate(self, time_ns: int, *, again: bool) -> None:
+        """Bring the outputs to the time [ns]; see :meth:`Runner.evaluate`."""
         try:
-            self._runner.evaluate(time_ns)
-            return self._runner.save() if save else b""
+            self._runner.evaluate(time_ns, again=again)
         except CallError as error:
             raise self._failure(error) from None
 

@@ -30,7 +30,7 @@ class Worker(Protocol):
 
     memory: Any
 
-    def evaluate(self, time_ns: int, *, save: bool) -> bytes: ...
+    def evaluate(self, time_ns: int, *, again: bool) -> None: ...
     def save(self) -> bytes: ...
     def restore(self, blob: bytes) -> None: ...
     def close(self, *, kill: bool = False) -> None: ...
@@ -143,24 +143,22 @@ class Instances:
         ]
         return _Part(worker, slice(first, first + count), *arrays)
 
-    def evaluate(self, time_ns: int, *, save: bool) -> list[bytes]:
-        """Bring the outputs to the time [ns]; return all memory afterwards if asked to.
+    def evaluate(self, time_ns: int, *, again: bool = False) -> None:
+        """Bring the outputs to the time [ns]; see :meth:`Runner.evaluate`.
 
         Raises:
             SimulationError: naming the file, the step, the call, and what the FMU logged last.
         """
         several = len(self._parts) > 1
-        blobs = []
         try:
             for part in self._parts:
                 if several:
                     part.inputs[:], part.accepted[:] = self.inputs[part.rows], self.accepted[part.rows]
-                blobs.append(part.worker.evaluate(time_ns, save=save))
+                part.worker.evaluate(time_ns, again=again)
                 if several:
                     self.outputs[part.rows] = part.outputs
         except SimulationError as error:
             raise self._failure(time_ns, error) from None
-        return blobs
 
     def _failure(self, time_ns: int, error: SimulationError) -> SimulationError:
         self.close(kill=True)

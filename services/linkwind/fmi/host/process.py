@@ -17,7 +17,6 @@ import struct
 import subprocess
 import sys
 import threading
-import time
 import weakref
 from collections import deque
 from collections.abc import Iterable
@@ -168,13 +167,9 @@ class WorkerProcess:
             raise
         raise self._failure("")
 
-    def evaluate(self, time_ns: int, *, save: bool) -> bytes:
-        """Bring the outputs to the time [ns]; return all memory afterwards if asked to."""
-        self._follower.come()
-        start = time.perf_counter()
-        answer = self.request(b"S" if save else b"s", time_ns)
-        self._follower.took(time.perf_counter() - start)
-        return answer
+    def evaluate(self, time_ns: int, *, again: bool) -> None:
+        """Bring the outputs to the time [ns]; see :meth:`Runner.evaluate`."""
+        self._follower.ask(lambda: self.request(b"a" if again else b"s", time_ns))
 
     def save(self) -> bytes:
         """Return all memory of the instances."""

@@ -21,7 +21,6 @@ from typing import Any
 from fmpy.fmi2 import fmi2CallbackFunctions
 from fmpy.fmi3 import fmi3IntermediateUpdateCallback, fmi3LogMessageCallback
 
-from linkwind.fmi.host.following import Follower
 from linkwind.fmi.host.library import CallError
 
 _HEAD = struct.Struct("<QQII14Q")
@@ -70,7 +69,6 @@ class Connection:
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._to, self._from = self._process.stdin.fileno(), self._process.stdout.fileno()
-        self._follower = Follower(self._process.pid)
         hello = _HEAD.unpack(self._receive("its start")[0])
         numbers: list[int] = list(hello[4:9])
         self.load, self.find, self.last_error, self.callbacks2, self.log3 = numbers
@@ -93,7 +91,6 @@ class Connection:
             message.take(argument, types[i] if i < len(types) else None, i)
             for i, argument in enumerate(arguments)
         ]
-        self._follower.come()
         self._send(message.pack(function, values))
         head, rest = self._receive(name)
         message.put_back(rest)

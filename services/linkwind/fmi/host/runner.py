@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import mmap
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from enum import Enum, auto
 from pathlib import Path
 from typing import Any
@@ -47,6 +47,7 @@ class Runner:
         self._steppers = [_STEPPERS[plan.interface](binding, plan) for binding in self._bindings]
         self._kept: dict[int, list[Any]] = {}
         self._next_kept = 0
+        self._before: tuple[int, list[tuple[Any, list[float]]]] | None = None  # time, states before a step
         self._now = self._start = 0
         self._configure()
 
@@ -66,12 +67,21 @@ class Runner:
             binding.set(self._plan.start)
         self._mode = Mode.INSTANTIATED
 
-    def evaluate(self, time_ns: int) -> None:
+    def evaluate(self, time_ns: int, *, again: bool = False) -> None:
         """Bring the outputs to the time [ns], with the inputs that lie in the shared memory.
 
-        The first call initialises, and reads the outputs in initialisation mode. Later ones step, or set the
-        inputs again where the time is the same; with an FMU that steps more rarely the outputs are held.
+        The first call initialises, and reads the outputs in initialisation mode. Later ones step; with an FMU
+        that steps more rarely the outputs are held.
+
+        Args:
+            time_ns: of the communication point.
+            again: whether the last call was for the same point: go back to before it, where the FMU has
+                state, else only set the inputs again.
         """
+        if again:
+            self._rewind()
+        else:
+            self._forget()
         if self._mode is Mode.INSTANTIATED:
             self._initialise(time_ns)
         elif time_ns == self._now:
@@ -81,7 +91,7 @@ class Runner:
             return
         else:
             raise CallError(f"expected a time after {self._now / 1e9:.9g} s; got {time_ns / 1e9:.9g} s")
-        for binding, stepper in zip(self._bindings, self._steppers, strict=True):
+        for binding, stepper in self._each():
             stepper.reread(time_ns / 1e9)
             binding.get_outputs()
 
@@ -101,6 +111,8 @@ class Runner:
             own = time_ns - self._now
         elif (time_ns - self._start) % own:
             return  # between its steps: the outputs are held
+        if self._before is None and self._plan.state != "none":
+            self._before = self._now, [(b.keep(), s.memory()) for b, s in self._each()]
         while self._now < time_ns:
             end_ns = self._now + own
             t, end, h = self._now / 1e9, end_ns / 1e9, own / 1e9
@@ -118,6 +130,25 @@ class Runner:
             self._mode = Mode.STEPPING
 
     # --- memory ---------------------------------------------------------------------------------------
+
+    def _each(self) -> Iterator[tuple[Binding, CoSimulation | ModelExchange]]:
+        return zip(self._bindings, self._steppers, strict=True)
+
+    def _rewind(self) -> None:
+        """Go back to before the last step, if there was one."""
+        if self._before is not None:
+            self._now, states = self._before
+            for (binding, stepper), (handle, memory) in zip(self._each(), states, strict=True):
+                binding.go_back(handle)
+                stepper.remember(memory)
+                stepper.after_restore()
+
+    def _forget(self) -> None:
+        """Drop what ``_rewind`` would go back to."""
+        if self._before is not None:
+            for binding, (handle, _) in zip(self._bindings, self._before[1], strict=True):
+                binding.drop(handle)
+            self._before = None
 
     def save(self) -> bytes:
         """Return all memory: of the instances, and which outputs are held."""
@@ -158,6 +189,7 @@ class Runner:
             raise CallError("the checkpoint is not one of a hosted FMU") from None
         if magic != _MAGIC or count != len(self._bindings):
             raise CallError("the checkpoint is not one of these instances")
+        self._forget()
         if not begun:
             self._fresh()
             return
@@ -207,6 +239,7 @@ class Runner:
 
     def close(self) -> None:
         """Terminate and free every instance."""
+        self._forget()
         for handles in self._kept.values():
             for binding, handle in zip(self._bindings, handles, strict=True):
                 binding.drop(handle)

@@ -64,9 +64,9 @@ class Server:
         runner = self._runner
         if runner is None:
             raise CallError("there is no plan yet")
-        if what in b"sS":
-            runner.evaluate(number)
-        if what in b"Sv":
+        if what in b"sa":
+            runner.evaluate(number, again=what == b"a")
+        if what == b"v":
             return runner.save()
         if what == b"r":
             runner.restore(payload)
