@@ -4,10 +4,11 @@
 #include <pthread.h>
 #include <sched.h>
 #include <stdlib.h>
+#include <time.h>
 #include <unistd.h>
 
-/* Turns of waiting before a thread sleeps, about 0.1 ms: the time between two jobs, when there are more. */
-enum { SPINS = 4000 };
+/* How long a thread waits awake [ns]: longer than from one job to the next, while there are more. */
+enum { PATIENCE = 100000 };
 
 /* `ticket` holds the parts that are left in its low half and the number of the job in its high half: taking
  * a part is one compare-and-swap, which fails for a thread that is late by a job. `part` and `job` may be
@@ -31,6 +32,12 @@ static void pause_briefly(void) {
 #elif defined(__aarch64__)
     __asm__ volatile("yield");
 #endif
+}
+
+static int64_t now(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (int64_t)t.tv_sec * 1000000000 + t.tv_nsec;
 }
 
 static void work(lw_threads *team) {
@@ -63,7 +70,8 @@ static void sleep_until_work(lw_threads *team) {
 static void *member(void *argument) {
     lw_threads *team = argument;
     while (!__atomic_load_n(&team->stopping, __ATOMIC_ACQUIRE)) {
-        for (int spin = 0; spin < SPINS && idle(team); ++spin) {
+        const int64_t until = now() + PATIENCE;
+        while (idle(team) && now() < until) {
             pause_briefly();
         }
         if (idle(team)) {
@@ -115,8 +123,9 @@ void lw_threads_run(lw_threads *team, lw_part *part, const void *job, int32_t pa
     __atomic_store_n(&team->ticket, number << 32 | (uint32_t)parts, __ATOMIC_SEQ_CST);
     wake_all(team);
     work(team);
-    for (int spin = 0; __atomic_load_n(&team->unfinished, __ATOMIC_ACQUIRE) > 0; ++spin) {
-        if (spin < SPINS) {
+    const int64_t until = now() + PATIENCE;
+    while (__atomic_load_n(&team->unfinished, __ATOMIC_ACQUIRE) > 0) {
+        if (now() < until) {
             pause_briefly();
         } else {
             sched_yield(); /* its processor may be this one */
