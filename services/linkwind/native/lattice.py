@@ -44,8 +44,7 @@ class Picture:
     Attributes:
         velocity: momentum over mass [cells/step], shape (2, ny // stride, nx // stride).
         density: less 1, shape (ny // stride, nx // stride).
-        vorticity: ∂v/∂x − ∂u/∂y [1/step] by central differences of ``velocity``, one-sided at the borders,
-            same shape.
+        vorticity: ∂v/∂x − ∂u/∂y [1/step], central differences (one-sided at borders), shape of density.
     """
 
     velocity: Floats
@@ -87,8 +86,7 @@ class Lattice:
             ny: cells along y.
             shear_rate: ω between 0 and 2, see ``shear_rate()``.
             stream: velocity of the undisturbed fluid [cells/step], at most 0.3.
-            fringe: layers on every side that relax towards the stream; layer k by 0.3 ((fringe − k)/fringe)³
-                in a step.
+            fringe: layers on every side that relax towards the stream, layer k by 0.3 (1 − k/fringe)³ a step.
             threads: that share a step.
 
         Raises:
@@ -105,11 +103,9 @@ class Lattice:
         self._buffers: list[Floats] = [buffer.reshape(DIRECTIONS, ny, nx) for buffer in buffers]
         self.force = _aligned(2 * ny * nx).reshape(2, ny, nx)
         self._blend = np.zeros(nx, dtype=np.float32)
-        self._struct = _Lattice(nx=nx, ny=ny, fringe=fringe, plane=plane)
-        for name, array in zip(
-            ("populations", "next", "force", "blend"), (*self._buffers, self.force, self._blend), strict=True
-        ):
-            setattr(self._struct, name, _address(array))
+        first, second = map(_address, self._buffers)
+        pointers = {"populations": first, "next": second, "force": _address(self.force)}
+        self._struct = _Lattice(nx, ny, fringe, plane=plane, blend=_address(self._blend), **pointers)
         self.force_rows = (0, ny)
         self.shear_rate, self.stream = shear_rate, stream
         self.struct_address = ctypes.addressof(self._struct)
@@ -127,9 +123,7 @@ class Lattice:
         destroy = declare("lw_threads_destroy", [ctypes.c_void_p], None)
         self._struct.threads = create(self.threads)
         if not self._struct.threads:
-            raise LinkwindError(
-                f"threads: expected to start {self.threads}; got too few resources. Use fewer."
-            )
+            raise LinkwindError(f"threads: expected to start {self.threads}; the system refused. Use fewer.")
         weakref.finalize(self, destroy, self._struct.threads)
 
     @property
@@ -164,7 +158,7 @@ class Lattice:
     def stream(self, value: tuple[float, float]) -> None:
         if not math.hypot(*value) <= MAX_SPEED:
             raise ValueError(
-                f"stream: expected at most {MAX_SPEED} cells a step; got {value}. Use a shorter time step."
+                f"stream: expected at most {MAX_SPEED} cells a step; got {value}. Shorten the step."
             )
         self._struct.stream[:] = value
 
@@ -183,8 +177,8 @@ class Lattice:
         """Go on by one step.
 
         Args:
-            shift: of the window, in cells: cell (i, j) is (i + shift[0], j + shift[1]) of the window before,
-                to which ``force`` belongs. What was outside of it is the stream.
+            shift: of the window [cells]: cell (i, j) is (i + shift[0], j + shift[1]) of the window before, to
+                which ``force`` belongs. What was outside of it is the stream.
         """
         self._step(self.struct_address, *shift)
 
@@ -215,8 +209,7 @@ class Lattice:
             shear_rate: the new ω, 4ω/(2 + ω) where the physical viscosity stays.
 
         Raises:
-            ValueError: the new rate is out of its range, or the old one is 1: there the populations hold no
-                stress.
+            ValueError: the new rate is out of its range, or the old one is 1, which leaves no stress to keep.
         """
         old = self.shear_rate
         self.shear_rate = shear_rate  # checks it
@@ -234,9 +227,9 @@ class Lattice:
 
     @state.setter
     def state(self, value: bytes) -> None:
-        numbers = np.frombuffer(value, dtype=np.float32) if len(value) % 4 == 0 else np.empty(0)
-        if len(numbers) != 3 + self.populations.size:
+        if len(value) != 12 + self.populations.nbytes:
             raise ValueError(f"state: expected {12 + self.populations.nbytes} bytes; got {len(value)}")
+        numbers = np.frombuffer(value, dtype=np.float32)
         self.shear_rate, self.stream = float(numbers[0]), (float(numbers[1]), float(numbers[2]))
         self.populations[:] = numbers[3:].reshape(DIRECTIONS, self.ny, self.nx)
 
