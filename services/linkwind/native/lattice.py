@@ -22,7 +22,6 @@ Floats = NDArray[np.float32]
 DIRECTIONS = 9
 MAX_SPEED = 0.3  # cells/step: faster, and the error of the method, of third order in it, is no longer small
 _PADDING = 112  # floats behind each plane: without it all planes of 512 x 448 would share the same cache sets
-_ALIGNMENT = 64  # bytes
 
 
 class _Lattice(ctypes.Structure):
@@ -158,7 +157,7 @@ class Lattice:
     def stream(self, value: tuple[float, float]) -> None:
         if not math.hypot(*value) <= MAX_SPEED:
             raise ValueError(
-                f"stream: expected at most {MAX_SPEED} cells a step; got {value}. Shorten the step."
+                f"stream: expected at most {MAX_SPEED} cells/step; got {value}. Shorten the step."
             )
         self._struct.stream[:] = value
 
@@ -244,8 +243,8 @@ def _check_size(nx: int, ny: int, fringe: int) -> None:
 
 def _aligned(count: int) -> Floats:
     """Return zeros at the start of a cache line."""
-    memory = np.zeros(count + _ALIGNMENT // 4, dtype=np.float32)
-    start = -_address(memory) % _ALIGNMENT // 4
+    memory = np.zeros(count + 16, dtype=np.float32)
+    start = -_address(memory) % 64 // 4
     return memory[start : start + count]
 
 
