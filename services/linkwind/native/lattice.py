@@ -103,24 +103,21 @@ class Lattice:
         self.force = _aligned(2 * ny * nx).reshape(2, ny, nx)
         self._blend = np.zeros(nx, dtype=np.float32)
         first, second = map(_address, self._buffers)
-        pointers = {"populations": first, "next": second, "force": _address(self.force)}
-        self._struct = _Lattice(nx, ny, fringe, plane=plane, blend=_address(self._blend), **pointers)
-        self.force_rows = (0, ny)
+        rest = (plane, first, second, _address(self.force), _address(self._blend))
+        self._struct = _Lattice(nx, ny, fringe, 0, ny, 0.0, (0.0, 0.0), *rest)
         self.shear_rate, self.stream = shear_rate, stream
         self.struct_address = ctypes.addressof(self._struct)
-        self._start_threads()
-        integer, pointer = ctypes.c_int32, ctypes.c_void_p
-        self._step = declare("lw_lattice_step", [pointer, integer, integer], None)
-        self._moments = declare("lw_lattice_moments", [pointer, integer, pointer, pointer], None)
+        if threads > 1:
+            self._start_threads()
+        number, pointer = ctypes.c_int32, ctypes.c_void_p
+        self._step = declare("lw_lattice_step", [pointer, number, number], None)
+        self._moments = declare("lw_lattice_moments", [pointer, number, pointer, pointer], None)
         self._halve_step = declare("lw_lattice_halve_step", [pointer, ctypes.c_float])
         declare("lw_lattice_init", [pointer], None)(self.struct_address)
 
     def _start_threads(self) -> None:
-        if self.threads == 1:
-            return
-        create = declare("lw_threads_create", [ctypes.c_int32], ctypes.c_void_p)
         destroy = declare("lw_threads_destroy", [ctypes.c_void_p], None)
-        self._struct.threads = create(self.threads)
+        self._struct.threads = declare("lw_threads_create", [ctypes.c_int32], ctypes.c_void_p)(self.threads)
         if not self._struct.threads:
             raise LinkwindError(f"threads: expected to start {self.threads}; the system refused. Use fewer.")
         weakref.finalize(self, destroy, self._struct.threads)
