@@ -6,10 +6,12 @@ import sys
 import numpy as np
 import pytest
 
+from linkwind.report.flow import survey
 from linkwind.report.page import render
 
 from .chromium import PROGRAM, Chromium
 from .synthetic import flapper, planar
+from .wakes import wake
 
 pytestmark = pytest.mark.skipif(
     PROGRAM is None or sys.platform == "win32", reason="needs chromium: apt-get install chromium"
@@ -32,6 +34,8 @@ def pages(tmp_path_factory):
     runs["diverged"] = dataclasses.replace(
         planar(400, name="diverged"), trajectory=diverged, complete=False, error="NaN"
     )
+    flow = survey("aero", lambda: wake(planar(400), every=50, rows=56, columns=64))
+    runs["flow"] = dataclasses.replace(planar(400, name="flow"), flows=(flow,))
     for name, run in runs.items():
         (folder / f"{name}.html").write_text(render(run), encoding="utf-8")
     return folder
@@ -186,7 +190,52 @@ def test_a_phone_needs_no_sideways_scrolling(page):
         page.send("Emulation.setDeviceMetricsOverride", **size)
 
 
-@pytest.mark.parametrize("name", ["planar", "flapper", "single", "diverged"])
+def look(browser, quantity):
+    browser.evaluate(f"flow.value = '{quantity}'; flow.dispatchEvent(new Event('change'))")
+
+
+def test_the_flow_is_behind_the_mechanism_until_it_is_switched_off(browser, pages):
+    browser.open(pages / "flow.html")
+    assert browser.evaluate("[...flow.options].map(o => o.value)") == ["vorticity", "speed", "off"]
+    assert not browser.evaluate("document.getElementById('flow-choice').hidden")
+    scrub(browser, 320)
+    look(browser, "off")
+    assert browser.evaluate("document.getElementById('flow-scale').hidden")
+    bare = picture(browser)
+    seen = {bare}
+    for quantity, unit in (("vorticity", "1/s"), ("speed", "m/s")):
+        look(browser, quantity)
+        shows = "document.getElementById('scene').toDataURL()"
+        browser.until(f"{shows} !== '{bare}'")  # its picture has been decoded
+        seen.add(picture(browser))
+        scale = browser.evaluate("document.getElementById('flow-scale').textContent")
+        assert scale.endswith(f" {unit}")
+        assert scale.startswith("−" if quantity == "vorticity" else "0")
+    assert len(seen) == 3
+    look(browser, "off")
+    assert picture(browser) == bare
+
+
+def test_a_frame_of_the_flow_stays_until_the_next_one(browser, pages):
+    """Colours beside the mechanism: those of the speed change at a frame's time, not between two of them."""
+    browser.open(pages / "flow.html")
+    look(browser, "speed")
+    pixels = "scene.getContext('2d').getImageData(20, scene.height - 70, 300, 1).data.join()"
+    browser.until("scene.getContext('2d').getImageData(20, scene.height - 70, 1, 1).data[3] > 100")
+    scrub(browser, 200)
+    first = browser.until(pixels)
+    scrub(browser, 249)
+    assert browser.evaluate(pixels) == first
+    scrub(browser, 250)
+    assert browser.evaluate(pixels) != first
+
+
+def test_a_page_without_frames_has_no_switch(page):
+    assert page.evaluate("document.getElementById('flow-choice').hidden")
+    assert page.evaluate("getComputedStyle(document.getElementById('flow-choice')).display") == "none"
+
+
+@pytest.mark.parametrize("name", ["planar", "flapper", "single", "diverged", "flow"])
 def test_nothing_fails_and_nothing_is_fetched(browser, pages, name):
     browser.open(pages / f"{name}.html")
     browser.key("End")

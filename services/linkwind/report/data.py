@@ -4,19 +4,37 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwind.log.contents import STATE, STEP, TIMING
+from linkwind.log.contents import STATE, STEP, TIMING, WRENCH
 from linkwind.log.reader import Log, open_log
-from linkwind.log.tables import Trajectory
+from linkwind.log.tables import Trajectory, seconds
+from linkwind.report.flow import Flow, survey
 from linkwind.spatial import Array
+
+
+@dataclass(frozen=True)
+class Diagnostics:
+    """A provider's own numbers.
+
+    Attributes:
+        provider: its name.
+        names: of its numbers.
+        t: simulation time of each answer [s], shape (m,).
+        values: of the numbers, shape (m, len(names)).
+    """
+
+    provider: str
+    names: tuple[str, ...]
+    t: Array
+    values: Array
 
 
 @dataclass(frozen=True)
@@ -35,6 +53,8 @@ class Run:
         interface_energy: step size times the power of the wrench on trial minus accepted twist [J],
             shape (m,).
         exchange: wall time of each exchange [s], shape (m,).
+        flows: frames of the fluid, of each provider that showed any.
+        diagnostics: numbers of each provider that reported any.
     """
 
     scenario: Mapping[str, Any]
@@ -47,6 +67,8 @@ class Run:
     extrapolation_error: Array
     interface_energy: Array
     exchange: Array
+    flows: tuple[Flow, ...] = ()
+    diagnostics: tuple[Diagnostics, ...] = ()
 
     @property
     def steps(self) -> int:
@@ -132,7 +154,17 @@ def read(path: Path) -> Run:
         extrapolation_error=coupling.extrapolation_error if coupling else np.empty((0, 0)),
         interface_energy=coupling.interface_energy if coupling else np.empty(0),
         exchange=log.timing().exchange_ns / np.float64(1e9) if TIMING in log.topics else np.empty(0),
+        flows=tuple(filter(None, (survey(name, partial(log.frames, name)) for name in log.flows))),
+        diagnostics=tuple(_diagnostics(log)),
     )
+
+
+def _diagnostics(log: Log) -> Iterator[Diagnostics]:
+    for provider, names in log.diagnostics.items():
+        if log.topics.get(WRENCH + provider):
+            columns = log.columns(WRENCH + provider)
+            t, values = seconds(columns["time_ns"][:, 0]), columns["diagnostics"]
+            yield Diagnostics(provider, names[: values.shape[1]], t, values)
 
 
 def no_trajectory(n: int) -> Trajectory:

@@ -12,13 +12,14 @@ from plotly.offline import get_plotlyjs
 
 from linkwind.report.arrays import pack
 from linkwind.report.data import Run
+from linkwind.report.gallery import gallery
 from linkwind.report.header import badge, banner, note, tiles
 from linkwind.report.panels import panels
 from linkwind.report.scene import scene
 from linkwind.report.tables import tables
 
 _ASSETS = files("linkwind.report").joinpath("assets")
-_SCRIPTS = ("clock.js", "charts.js", "motion.js", "scene.js", "main.js")
+_SCRIPTS = ("clock.js", "charts.js", "motion.js", "film.js", "scene.js", "main.js")
 
 
 def render(run: Run) -> str:
@@ -31,6 +32,7 @@ def render(run: Run) -> str:
         description=escape(run.scenario.get("description", "")),
         banner=banner(run),
         tiles=tiles(run),
+        gallery=gallery(run),
         note=note(run),
         tables=tables(run),
         data=script_json(_data(run)),
@@ -55,4 +57,18 @@ def _data(run: Run) -> dict[str, Any]:
     moving = scene(run)
     if moving is None:
         return {"scene": None}
-    return {"scene": moving, "t": pack(run.trajectory.t, "f8"), "panels": panels(run)}
+    return {
+        "scene": moving,
+        "t": pack(run.trajectory.t, "f8"),
+        "panels": panels(run),
+        "flow": _film(run) if moving["planar"] else None,
+    }
+
+
+def _film(run: Run) -> dict[str, Any] | None:
+    """Return the flow behind the animation, of the first provider that shows its own."""
+    if not run.flows:
+        return None
+    from linkwind.report.film import film
+
+    return film(run.flows[0])

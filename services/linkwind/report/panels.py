@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from html import escape
 from typing import Any
 
 import numpy as np
 
 from linkwind.report.arrays import pack, peaks
-from linkwind.report.data import Run, largest
+from linkwind.report.data import Diagnostics, Run, largest
 from linkwind.spatial import Array
 
 POINTS = 2000  # of a curve
@@ -28,7 +29,7 @@ def panels(run: Run) -> list[dict[str, Any]]:
     """Return the plots of a run in reading order; those that have nothing to show are left out."""
     every = (_velocity, _aerodynamic, _joints, _coupling, _energy, _exchange)
     made = (panel(run) for panel in every)
-    return [panel for panel in made if panel is not None]
+    return [panel for panel in made if panel is not None] + [_reported(run, each) for each in run.diagnostics]
 
 
 def prefixed(value: float, unit: str) -> tuple[float, str]:
@@ -138,6 +139,15 @@ def _coupling(run: Run) -> dict[str, Any] | None:
     rows.append(_row(f"ΔE [{unit}]", energy))
     note = "Extrapolation: degree, errors by degree, energy error."
     return _panel("Coupling", rows, note)
+
+
+def _reported(run: Run, diagnostics: Diagnostics) -> dict[str, Any]:
+    """Return a row for each number that a provider reports with its wrenches."""
+    rows = [
+        _row(escape(name), _curve(run, name, 7, diagnostics.values[:, i], diagnostics.t))
+        for i, name in enumerate(diagnostics.names)
+    ]
+    return _panel(f"Reported by {diagnostics.provider}", rows, "Its own numbers, with each wrench.")
 
 
 def _exchange(run: Run) -> dict[str, Any] | None:

@@ -12,6 +12,6 @@ if (data.scene === null) {
     item.style.setProperty("--colour", `var(--${bodyColour(i)})`);
   });
   makeControls(clock);
-  makeScene(document.getElementById("scene"), data.scene, clock);
+  makeScene(document.getElementById("scene"), data.scene, clock, data.flow);
   makeCharts(data.panels, clock, document.getElementById("charts"));
 }

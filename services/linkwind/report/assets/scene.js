@@ -17,12 +17,13 @@ function arrow(pen, from, to, head) {
   pen.fill();
 }
 
-function makeScene(canvas, scene, clock) {
+function makeScene(canvas, scene, clock, flow) {
   const pen = canvas.getContext("2d"), follow = document.getElementById("follow");
   const { times } = clock, motion = makeMotion(scene, times), camera = makeCamera(scene);
   const world = extents(scene, motion, times);
   const size = world.high.map((x, k) => x - world.low[k]);
   follow.checked = length(size) > 14 * world.reach;
+  const film = flow ? makeFilm(flow, () => draw()) : null;
   const path = times.map ? Array.from(times, (t) => motion.centre(motion.poses(t))) : [];
   const windSpeed = length(scene.wind);
   let colour = theme();
@@ -94,18 +95,23 @@ function makeScene(canvas, scene, clock) {
     pen.globalAlpha = 1;
   }
 
-  function bodies(now, alpha) {
+  function bodies(now, alpha, cased = false) {
     const order = now.map((pose, b) => [camera.turn(pose.at)[2], b]).sort((p, q) => p[0] - q[0]);
     for (const [, b] of order) {
       const { lines, thick, reach } = scene.bodies[b], pose = now[b];
       pen.strokeStyle = pen.fillStyle = colour(bodyColour(b));
       pen.lineJoin = pen.lineCap = "round";
-      pen.lineWidth = thick ? Math.max(3.5, (scene.planar ? 0.05 : 0.02) * reach * camera.scale) : 2;
+      const width = thick ? Math.max(3.5, (scene.planar ? 0.05 : 0.02) * reach * camera.scale) : 2;
       for (const { points, closed } of lines) {
         pen.beginPath();
         for (const point of points) pen.lineTo(...camera.project(add(pose.at, turned(pose.q, point))).slice(0, 2));
         if (closed) { pen.closePath(); pen.globalAlpha = 0.28 * alpha; pen.fill(); }
         pen.globalAlpha = alpha;
+        if (cased) { // seen on any colour of the flow
+          pen.strokeStyle = colour("card"); pen.lineWidth = width + 3; pen.stroke();
+          pen.strokeStyle = pen.fillStyle;
+        }
+        pen.lineWidth = width;
         pen.stroke();
       }
     }
@@ -190,14 +196,15 @@ function makeScene(canvas, scene, clock) {
     pen.clearRect(0, 0, camera.w, camera.h);
     pen.font = "12px system-ui, sans-serif";
     aim(now);
+    const filmed = film?.draw(pen, camera, t);
     if (scene.planar) grid();
-    streaks(t);
+    if (!filmed) streaks(t);
     trail(t);
     for (let i = 0; i < GHOSTS; i++) {
       const then = clock.first + (clock.last - clock.first) * i / GHOSTS;
       if (then < t) bodies(motion.poses(then), 0.22);
     }
-    bodies(now, 1);
+    bodies(now, 1, filmed);
     forces(now);
     joints(now);
     key();
