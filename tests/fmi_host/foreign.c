@@ -177,6 +177,9 @@ F(GetReal)(C c, const fmi2ValueReference vr[], size_t n, fmi2Real value[])
 F(SetReal)(C c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[])
 {
     M *m = c;
+#ifdef DISCRETE_INPUTS
+    EXPECT(m, m->mode != CONTINUOUS);
+#endif
     for (size_t i = 0; i < n; i++) m->v[vr[i]] = value[i];
     return OK;
 }
@@ -312,6 +315,9 @@ F(SetFloat64)(C c, const fmi3ValueReference vr[], size_t n, const fmi3Float64 va
 {
     static const int offsets[] = OFFSETS;
     M *m = c;
+#ifdef DISCRETE_INPUTS
+    EXPECT(m, m->mode != CONTINUOUS);
+#endif
     for (size_t i = 0; i < n; i++)
         for (size_t k = 0; k < size_of(m, vr[i]); k++, count--) {
             EXPECT(m, count > 0);

@@ -38,6 +38,7 @@ class Variable:
     start: float = 0.0
     unit: str = ""
     type: str = "Real"
+    discrete: bool = False
 
     @property
     def room(self) -> int:
@@ -205,7 +206,9 @@ def _scalar2(variable: Variable, reference: int) -> str:
     start = f' start="{value}"' if has_start else ""
     fixed = ' variability="fixed"' if variable.causality == "parameter" else ""
     discrete = (
-        ' variability="discrete"' if variable.type != "Real" and variable.causality == "input" else fixed
+        ' variability="discrete"'
+        if variable.discrete or (variable.type != "Real" and variable.causality == "input")
+        else fixed
     )
     return (
         f'<ScalarVariable name={quoteattr(variable.name)} valueReference="{reference}" '
@@ -229,6 +232,7 @@ def _description3(foreign: Foreign) -> str:
         unit = f" unit={quoteattr(v.unit)}" if v.unit else ""
         start = f' start="{v.start!r}"' if v.causality in ("input", "parameter") else ""
         fixed = ' variability="fixed"' if v.causality == "parameter" else ""
+        fixed = ' variability="discrete"' if v.discrete else fixed
         variables.append(
             f'<Float64 name={quoteattr(v.name)} valueReference="{i}" causality="{v.causality}"'
             f"{fixed}{unit}{start}>{dimensions}</Float64>"

@@ -218,6 +218,30 @@ def test_state_events_are_noticed_at_the_end_of_the_step(host, fmi):
     assert [hosted.step(k)[0][0] for k in range(5)] == [0.0, 1.0, 1.0, 2.0, 2.0]
 
 
+@both
+def test_discrete_inputs_are_set_at_events_and_held(host, fmi):
+    """An integral of a force that jumps at each communication point."""
+    foreign = Foreign(
+        (Variable("vx", "input", discrete=True), Variable("Fx", "output")),
+        fmi=fmi,
+        interfaces=("ModelExchange",),
+        attributes='canGetAndSetFMUstate="true"',
+        states=1,
+        code="#define DISCRETE_INPUTS\n#define DERIVATIVES(m) (m->dx[0] = m->v[0])\n"
+        "#define OUTPUTS(m) (m->v[1] = m->x[0])",
+    )
+    hosted = host(foreign)
+    forces = []
+    for k in range(4):
+        hosted.motion.linear[0, 0] = 1000.0 * k
+        forces.append(hosted.step(k)[0][0])
+        hosted.motion.linear[0, 0] = -5.0
+        hosted.at(k)
+        hosted.motion.linear[0, 0] = 1000.0 * k
+        assert hosted.at(k)[0][0] == forces[-1]
+    assert forces == pytest.approx([0.0, 1.0, 3.0, 6.0], rel=1e-14)
+
+
 def test_the_interface_asked_for(host):
     foreign = replace(OSCILLATOR, interfaces=("ModelExchange", "CoSimulation"))
     assert host(foreign, 'interface = "me"').step(0)[0][0] == 0.0

@@ -20,6 +20,7 @@ class CoSimulation:
         self._fmu = binding
         self._event_mode = plan.event_mode
         self._variable_step = plan.variable_step
+        self._never_back = plan.state == "none"
 
     def begin(self, t: float) -> None:
         """Go from initialisation to stepping."""
@@ -41,14 +42,14 @@ class CoSimulation:
         # end − t is exact, so t + (end − t) is end to the last bit; an FMU that knows one step only wants h.
         size = end - t if self._variable_step else h
         if self._fmu.version == 2:
-            self._fmu.fmu.doStep(t, size)
+            self._fmu.fmu.doStep(t, size, self._never_back)
         else:
             self._advance3(t, end, size)
 
     def _advance3(self, t: float, end: float, size: float) -> None:
         slack = _TIME_EPSILON * max(1.0, abs(end))
         for _ in range(MAX_EVENT_ITERATIONS):
-            event, over, early, last = self._fmu.fmu.doStep(t, size)
+            event, over, early, last = self._fmu.fmu.doStep(t, size, self._never_back)
             self._fmu.refuse_end(over)
             # The time is only worth something after an early return: many FMUs do not fill it in otherwise.
             reached = last if early else end

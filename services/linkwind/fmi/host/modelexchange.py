@@ -1,7 +1,8 @@
 """Integrating a Model Exchange FMU from one communication point to the next.
 
 The classical Runge-Kutta scheme of order 4 over each internal step; the inputs run linearly from the
-accepted motion at the old point to the trial at the new one. Time events are met exactly; state events are
+accepted motion at the old point to the trial at the new one; if one of them is discrete, all hold the new
+value over the step. Time events are met exactly; state events are
 noticed at the end of the internal step in which an event indicator changes its sign.
 """
 
@@ -23,8 +24,11 @@ class ModelExchange:
         self._fmu = binding
         self._raw = binding.fmu
         self._completed_step = plan.completed_step
+        self._never_back = plan.state == "none"
+        self._discrete_inputs = plan.discrete_inputs
         self._sizes = (plan.states, plan.indicators)
         self._event_at = math.inf
+        self._begun = False
         self._signs: list[bool] = []
 
     def begin(self, t: float) -> None:
@@ -34,6 +38,7 @@ class ModelExchange:
         if self._fmu.version == 3:
             self._sizes = (self._raw.getNumberOfContinuousStates(), self._raw.getNumberOfEventIndicators())
         self._raw.enterContinuousTimeMode()
+        self._begun = True
         states, indicators = self._sizes
         self._x, self._dx = (c_double * states)(), (c_double * states)()
         self._z = (c_double * indicators)()
@@ -42,6 +47,8 @@ class ModelExchange:
     def advance(self, t: float, end: float, h: float) -> None:
         """Integrate from t to ``end`` [s]."""
         start = t
+        if self._discrete_inputs:
+            self._event(set_inputs=True)
         while t < end:
             stop = min(end, self._event_at) if self._event_at > t else end
             self._integrate(t, stop, start, end)
@@ -68,7 +75,9 @@ class ModelExchange:
     def _place(self, t: float, x: Values, start: float, end: float) -> None:
         """Put the FMU to time, states and inputs of a stage."""
         self._raw.setTime(t)
-        if t == end:
+        if self._discrete_inputs:
+            pass  # they have been set, and hold until the next step
+        elif t == end:
             self._fmu.set_inputs()
         else:
             part = (t - start) / (end - start)
@@ -95,19 +104,28 @@ class ModelExchange:
         """End an internal step: tell the FMU, and go through event mode where something happened."""
         wanted = False
         if self._completed_step:
-            wanted, over = self._raw.completedIntegratorStep()
+            wanted, over = self._raw.completedIntegratorStep(self._never_back)
             self._fmu.refuse_end(over)
         signs = self._indicator_signs()
         if timed or wanted or signs != self._signs:
-            self._raw.enterEventMode()
-            _, self._event_at = self._fmu.discrete_states()
-            self._raw.enterContinuousTimeMode()
+            self._event()
             signs = self._indicator_signs()
         self._signs = signs
 
+    def _event(self, *, set_inputs: bool = False) -> None:
+        """Go through event mode, the only one in which discrete inputs can be set."""
+        self._raw.enterEventMode()
+        if set_inputs:
+            self._fmu.set_inputs()
+        _, self._event_at = self._fmu.discrete_states()
+        self._raw.enterContinuousTimeMode()
+
     def reread(self, t: float) -> None:
         """Set the inputs again at the time that has been reached."""
-        self._fmu.set_inputs()
+        if self._discrete_inputs and self._begun:
+            self._event(set_inputs=True)
+        else:
+            self._fmu.set_inputs()
 
     def after_restore(self) -> None:
         """Look at the event indicators of the restored state."""

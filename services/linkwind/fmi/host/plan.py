@@ -37,6 +37,7 @@ class Plan:
         inputs, outputs: value references of the variables that are exchanged.
         input_size, output_size: number of their values (more than variables where there are arrays).
         variable_step: whether communication steps may differ; else they are all the same number.
+        discrete_inputs: whether an input changes at events only (Model Exchange).
         event_mode: whether it has one (Co-Simulation, FMI 3).
         states, indicators: number of continuous states and event indicators (Model Exchange).
         completed_step: whether it wants to be told about the end of integrator steps (Model Exchange).
@@ -65,6 +66,7 @@ class Plan:
     output_size: int
     variable_step: bool
     event_mode: bool
+    discrete_inputs: bool
     states: int
     indicators: int
     completed_step: bool

@@ -101,6 +101,7 @@ def plan(
         output_size=sum(variable.size for variable in mapping.output_variables),
         variable_step=can.variable_step,
         event_mode=can.event_mode,
+        discrete_inputs=any(variable.variability != "continuous" for variable in mapping.input_variables),
         states=fmu.states,
         indicators=fmu.indicators,
         completed_step=can.completed_step_needed,
