@@ -16,6 +16,7 @@ from linkwind.bus.zenoh import ZenohDynamicsLink, ZenohProviderLink, loopback_en
 from linkwind.dynamics.recorder import Recorder
 from linkwind.dynamics.service import DynamicsService
 from linkwind.frames import decode
+from linkwind.log.export import export_csv
 from linkwind.log.reader import open_log
 from linkwind.log.recover import recover
 from linkwind.log.writer import LogWriter
@@ -75,6 +76,15 @@ def test_the_log_holds_every_frame_and_the_names_of_the_numbers(log: Path) -> No
     assert opened.diagnostics == {"aero": ("points [1]", "time [s]")}
     numbers = opened.columns("/wrench/aero")["diagnostics"]
     assert np.array_equal(numbers[:, 0], np.maximum(0, np.arange(STEPS + 1) - 1))
+
+
+def test_the_report_shows_the_flow_and_the_table_names_the_numbers(log: Path, tmp_path: Path) -> None:
+    page = (log.parent / "report.html").read_text()
+    assert 'class="gallery"' in page
+    assert "Reported by aero" in page
+    export_csv(open_log(log), tmp_path / "tables")
+    head = (tmp_path / "tables" / "wrench_aero.csv").read_text().splitlines()[0]
+    assert head.endswith(",points [1],time [s]")
 
 
 def test_transport_changes_no_bit_and_no_place(log: Path, tmp_path: Path) -> None:

@@ -69,14 +69,16 @@ def export_csv(log: Log, folder: Path) -> list[Path]:
 
 def _write(log: Log, topic: str, writer: Any) -> None:
     name = str(contents.message_name(topic))
-    bodies = log.provider_bodies.get(topic.removeprefix(contents.WRENCH), log.bodies)
+    provider = topic.removeprefix(contents.WRENCH)
+    bodies, numbers = log.provider_bodies.get(provider, log.bodies), log.diagnostics.get(provider, ())
     payloads = (message.payload for message in log.raw(topic))
     head: list[str] = []
     while block := list(islice(payloads, BLOCK)):
         columns = tables.columns(block, name, f"{log.path}: {topic}")
         t = tables.seconds(columns.pop("time_ns"))
         if not head:
-            head = [label for field, values in columns.items() for label in _labels(field, values, bodies)]
+            labels = (_labels(field, values, bodies, numbers) for field, values in columns.items())
+            head = [label for field in labels for label in field]
             head.insert(1, "t [s]")
             writer.writerow(head)
         step, *others = columns.values()
@@ -89,9 +91,19 @@ def _rows(columns: Sequence[NDArray[Any]]) -> Iterator[list[float | int]]:
         yield [value for part in parts for value in part]
 
 
-def _labels(field: str, values: NDArray[Any], bodies: Sequence[str]) -> Iterator[str]:
-    """Yield the title of each column of a field: body, quantity, component, unit."""
+def _labels(field: str, values: NDArray[Any], bodies: Sequence[str], numbers: Sequence[str]) -> Iterator[str]:
+    """Yield the title of each column of a field: body, quantity, component, unit.
+
+    Args:
+        field: of the message, dotted.
+        values: its columns.
+        bodies: of the message.
+        numbers: names of the provider's own.
+    """
     leaf, width = field.rsplit(".", 1)[-1], values.shape[1]
+    if leaf == "diagnostics" and len(numbers) == width:
+        yield from numbers
+        return
     per_body = leaf in WIDTHS and width == WIDTHS[leaf] * len(bodies)
     for place in range(width):
         if per_body:
