@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from linkwind.aero.base import Capabilities
 from linkwind.spatial import Motion, Wrench
 
@@ -23,6 +25,7 @@ class FakeModel:
         self.calls: list[tuple[str, object]] = []
         self.blobs: list[bytes] = []
         self.poison: tuple[str, int, float] | None = None
+        self.response: np.ndarray | float = 0.0
         self._value = value
 
     def commit(self, t: float, motion: Motion) -> None:
@@ -34,6 +37,8 @@ class FakeModel:
         wrench.torque[:, 0] = self._value
         if wrench.added_inertia is not None:
             wrench.added_inertia[:, 0, 0] = 1.0
+        if wrench.response is not None:
+            wrench.response.ravel()[:] = np.ravel(self.response)
         if self.poison is not None:
             name, body, value = self.poison
             getattr(wrench, name)[body].ravel()[0] = value

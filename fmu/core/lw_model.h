@@ -74,7 +74,10 @@ int lw_accelerations(lw_multibody *multibody, const double *q, const double *v, 
                      double *joint_acceleration, lw_fault *fault);
 lw_spatial lw_total_wrench(const lw_link *link, const double *wrench);
 double lw_wrench_power(const lw_multibody *multibody, const double *wrench);
-/* lw_inputs.c */
+/* lw_linear.c: solve a x = b, (m,m) row-major; `a` is used up, x replaces b. */
+int lw_solve(int m, double *a, double *b);
+/* lw_inputs.c: index of the first number that is not finite, or -1; the inputs of a call */
+int lw_first_not_finite(const double *values, int count);
 int lw_inputs_check(const lw_multibody *multibody, const double *state, int32_t count,
                     const double *wrenches, const double *added_inertia, lw_fault *fault);
 

@@ -48,6 +48,8 @@ typedef enum {
     LW_WRENCH_NOT_FINITE,    /* item: body */
     LW_ADDED_NOT_FINITE,     /* item: body */
     LW_STATE_NOT_FINITE,     /* item: index in the state */
+    LW_RESPONSE_NOT_FINITE,  /* item: body */
+    LW_NOT_CONVERGED,        /* item: body whose affine wrench is not met */
     /* arguments */
     LW_BAD_STEP = 20,
     LW_BAD_NODES,
@@ -110,6 +112,29 @@ typedef struct {
 } lw_macro_step;
 
 LW_API int lw_multibody_advance(lw_multibody *multibody, const lw_macro_step *step);
+
+/* A wrench that is affine in the twist at the end of the step: the newest wrench of the step (its first) is
+ * meant for the twist `about`, and is less by G (twist - about) for the one that comes out. */
+typedef struct {
+    const double *response; /* (6n,6n) G, in W: rows force, torque; columns linear, angular of every body */
+    const double *about;    /* (n,6) twist, linear first, in W */
+    double *wrench;         /* out (n,6): newest wrench at the twist that came out */
+    double *held, *inertia; /* out (n,6), (n,6,6): newest wrench and added inertia (body frame) that the step
+                               was integrated with, which amount to the same */
+    double *memory;         /* lw_affine_size(n) doubles of the caller's, for the time of the call */
+} lw_affine;
+
+LW_API size_t lw_affine_size(int32_t n);
+
+/* A macro step under an affine wrench; `next` must not be the memory of `state`. A wrench held over the step
+ * (one node) may act on massless bodies: the bodies' own blocks of G then count as added inertia. */
+LW_API int lw_multibody_advance_affine(lw_multibody *multibody, const lw_macro_step *step,
+                                       const lw_affine *affine);
+
+/* The added inertia (n,6,6), body frame, that the bodies' own blocks of G amount to over a step of h [s], on top
+ * of `added_inertia` or NULL. */
+LW_API void lw_affine_inertia(lw_multibody *multibody, const double *state, const double *added_inertia,
+                              const double *response, double h, double *inertia);
 
 /* Poses and twists of the bodies: position (n,3), orientation (n,4), linear (n,3), angular (n,3), in W. */
 LW_API void lw_multibody_motion(lw_multibody *multibody, const double *state, lw_unaligned *position,

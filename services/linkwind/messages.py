@@ -125,11 +125,9 @@ class WrenchMessage(_Message):
 
     Attributes:
         wrench: forces, see :class:`linkwind.spatial.Wrench`.
-        response: ``G`` [N·s/m, N·s, N·m·s], in W, shape (36n,) or (36n²,); None where there is none.
-        diagnostics: the provider's own numbers, shape (len(names),); None where there are none.
     """
 
-    __slots__ = ("diagnostics", "response", "wrench")
+    __slots__ = ("wrench",)
 
     def __init__(
         self,
@@ -157,7 +155,11 @@ class WrenchMessage(_Message):
             diagnostics=_zeros(len(diagnostics)),
         )
         views = self._layout.views
-        added = views["added_inertia"].reshape(n, 6, 6) if added_inertia else None
-        self.wrench = Wrench(views["force"].reshape(n, 3), views["torque"].reshape(n, 3), added)
-        self.response = views["response"] if response_size else None
-        self.diagnostics = views["diagnostics"] if diagnostics else None
+        coupled = response_size == 36 * n * n
+        self.wrench = Wrench(
+            views["force"].reshape(n, 3),
+            views["torque"].reshape(n, 3),
+            views["added_inertia"].reshape(n, 6, 6) if added_inertia else None,
+            views["response"].reshape((6 * n, 6 * n) if coupled else (n, 6, 6)) if response_size else None,
+            views["diagnostics"] if diagnostics else None,
+        )

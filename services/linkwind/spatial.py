@@ -55,7 +55,8 @@ class Wrench:
     """Forces on bodies as arrays, which may be views into a message.
 
     The wrench on body b is ``(force[b], torque[b]) - rotated(added_inertia[b]) @ (linear acceleration,
-    angular acceleration)``; everything that is proportional to acceleration stays out of force and torque.
+    angular acceleration) - (response @ (twist - trial twist))[b]``; everything that is proportional to
+    acceleration stays out of force and torque.
 
     Attributes:
         force: [N], shape (n, 3), in W at the centre of mass.
@@ -63,15 +64,28 @@ class Wrench:
         added_inertia: ``A`` [kg, kg·m, kg·m²], shape (n, 6, 6), symmetric positive semi-definite, force
             rows first, in the **body** frame at the centre of mass, so that it is constant for a rigid
             shape; None where the provider returns none.
+        response: ``G`` [N·s/m, N·s, N·m·s], minus the derivative of the wrenches by the twists at the end of
+            the step, in W, shape (6n, 6n) where bodies are coupled, (n, 6, 6) where not; rows force and
+            torque, columns linear and angular of body after body; None where the provider returns none.
+        diagnostics: numbers of the provider's own about the step, shape (any,); None for none.
         addresses: where force, torque and added_inertia lie in memory (0 for None).
     """
 
-    __slots__ = ("added_inertia", "addresses", "force", "torque")
+    __slots__ = ("added_inertia", "addresses", "diagnostics", "force", "response", "torque")
 
-    def __init__(self, force: Array, torque: Array, added_inertia: Array | None = None) -> None:
+    def __init__(
+        self,
+        force: Array,
+        torque: Array,
+        added_inertia: Array | None = None,
+        response: Array | None = None,
+        diagnostics: Array | None = None,
+    ) -> None:
         self.force = force
         self.torque = torque
         self.added_inertia = added_inertia
+        self.response = response
+        self.diagnostics = diagnostics
         self.addresses = (
             address(force),
             address(torque),

@@ -69,7 +69,7 @@ def test_step_zero_commits_nothing_and_gives_the_first_wrench(
     d.motion.trial.linear[:] = [[1, 2, 3], [4, 5, 6]]
     exchange(d, p, 0)
     assert model.calls == [("evaluate", 0.0)]
-    wrench, added = d.total()
+    wrench, added, _ = d.total()
     assert added is None
     assert wrench[:, :3].tolist() == [[-1, -2, -3], [-4, -5, -6]]  # FakeModel: force = −velocity
 
@@ -199,12 +199,30 @@ def test_ready_without_hello_is_refused() -> None:
     assert d.not_ready == ["aero"]
 
 
-def test_response_matrix_is_refused_rather_than_ignored() -> None:
-    d, p = dynamics(), provider(FakeModel(response_size=72))
+def test_response_of_a_wrong_size_is_refused() -> None:
+    d, p = dynamics(), provider()
     p.welcome(d.control(p.hello()))
-    p.build()
-    with pytest.raises(RefusedError, match="response matrix G"):
-        p.started(d.control(p.ready()))
+    ready = Control(ready={"name": "aero", "instance": p.instance, "response_size": 71})
+    refused = reason(d.control(ready.SerializeToString()))
+    assert "expected 0, 72 or 144 numbers for 2 bodies; got 71" in refused
+
+
+def test_responses_of_several_providers_add_up_at_the_rows_and_columns_of_their_bodies() -> None:
+    d = dynamics(aero=["b", "a"], wing=["b"])
+    coupled, own = FakeModel(response_size=144), FakeModel(response_size=36)
+    coupled.response, own.response = np.arange(144.0), -np.arange(36.0)
+    participants = [provider(coupled), provider(own, "wing")]
+    for p in participants:
+        shake_hands(d, p)
+    d.post(0, 0)
+    for p in participants:
+        assert d.accept(p.name, p.answer(d.motion.payload()) or b"")
+    matrix, block = coupled.response.reshape(12, 12), own.response.reshape(6, 6)
+    expected = np.zeros((12, 12))
+    swap = [*range(6, 12), *range(6)]  # the provider's first body is the scenario's second
+    expected[np.ix_(swap, swap)] = matrix
+    expected[6:, 6:] += block
+    np.testing.assert_array_equal(d.total()[2], expected)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
@@ -245,7 +263,7 @@ def test_wrench_of_the_future_is_an_error_and_of_the_past_is_dropped(
     assert d.answered
     # A late repetition must not overwrite the numbers that were accepted.
     assert d.accept("aero", first) is False
-    wrench, _ = d.total()
+    wrench, _, _ = d.total()
     assert (wrench[:, :3] == -7.0).all()
     d.post(0, 0)
     with pytest.raises(ProtocolError, match="expected step 0 iteration 0; got step 1"):
@@ -298,7 +316,7 @@ def test_answers_of_several_providers_add_up_in_scenario_order() -> None:
         answer = p.answer(motion)
         assert answer is not None
         d.accept(p.name, answer)
-    wrench, added = d.total()
+    wrench, added, _ = d.total()
     assert added is not None
     assert wrench[:, 3].tolist() == [1.0, 10.0, 11.0]  # FakeModel: torque x = value
     assert added[:, 0, 0].tolist() == [1.0, 0.0, 1.0]

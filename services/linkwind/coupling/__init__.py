@@ -16,8 +16,18 @@ function ``run`` like those two, one entry here.
 from __future__ import annotations
 
 from linkwind.coupling import explicit, pec
-from linkwind.coupling.base import Answer, CommunicationPoint, Exchange, Plant, Scheme, Settings, State
+from linkwind.coupling.base import Answer, CommunicationPoint, Exchange, Met, Plant, Scheme, Settings, State
 
 SCHEMES: dict[str, Scheme] = {"explicit": explicit.run, "pec": pec.run}
 
-__all__ = ["SCHEMES", "Answer", "CommunicationPoint", "Exchange", "Plant", "Scheme", "Settings", "State"]
+__all__ = [
+    "SCHEMES",
+    "Answer",
+    "CommunicationPoint",
+    "Exchange",
+    "Met",
+    "Plant",
+    "Scheme",
+    "Settings",
+    "State",
+]

@@ -2,7 +2,8 @@
 
 Steps count from 0 and communication point k lies at t_k = k·h; schemes see no time, only abscissae in units
 of the step. Wrenches are (n, 6), force first [N, N·m], in W at the centres of mass. Added inertia
-[kg, kg·m, kg·m²] is (n, 6, 6), in the body frames, symmetric positive semi-definite.
+[kg, kg·m, kg·m²] is (n, 6, 6), in the body frames, symmetric positive semi-definite. Twists are (n, 6),
+linear first [m/s, rad/s], in W at the centres of mass.
 """
 
 from __future__ import annotations
@@ -24,10 +25,30 @@ class Answer(NamedTuple):
     Attributes:
         wrench: shape (n, 6), without the part that is proportional to acceleration. Copied by the scheme.
         added_inertia: ``A``, shape (n, 6, 6), for a further wrench −A·a; None for none. Copied as well.
+        response: ``G``, shape (6n, 6n): the wrench is less by G (twist − trial twist) for another twist at
+            the end of the step; None where that is not known. Copied as well.
     """
 
     wrench: Array
     added_inertia: Array | None = None
+    response: Array | None = None
+
+
+class Met(NamedTuple):
+    """A step whose wrench agrees with the twist that it leads to.
+
+    Attributes:
+        state: at the end of the step.
+        wrench: the newest wrench at the twist of that state, shape (n, 6).
+        held: what the step was integrated with at its newest node, shape (n, 6).
+        added_inertia: that it was integrated with, shape (n, 6, 6), part of the response
+            turned into inertia; None for none.
+    """
+
+    state: State
+    wrench: Array
+    held: Array
+    added_inertia: Array | None
 
 
 class Plant(Protocol):
@@ -48,6 +69,33 @@ class Plant(Protocol):
         Raises:
             SimulationError: numerical trouble; the result of a return is finite.
         """
+        ...
+
+    def meet(
+        self,
+        state: State,
+        nodes: Array,
+        wrenches: Array,
+        added_inertia: Array | None,
+        response: Array,
+        about: Array,
+    ) -> Met:
+        """Advance, as ``advance`` does, under a wrench that is affine in the twist at the end of the step.
+
+        ``response`` is ``G``, shape (6n, 6n), and ``about`` the twist that the newest wrench,
+        ``wrenches[0]``, is meant for, shape (n, 6).
+
+        Raises:
+            SimulationError: numerical trouble, or no such wrench is found.
+        """
+        ...
+
+    def twist(self, state: State) -> Array:
+        """Return the twists of the bodies, shape (n, 6)."""
+        ...
+
+    def inertia(self, state: State, added_inertia: Array | None, response: Array) -> Array:
+        """Return ``added_inertia`` and what each body's own response amounts to over a step, (n, 6, 6)."""
         ...
 
 
@@ -73,8 +121,9 @@ class CommunicationPoint(NamedTuple):
         step: k.
         state: accepted at t_k.
         trial: the state on which the wrench at t_k was evaluated.
-        wrench: at t_k, shape (n, 6): the last answer for it, or what `startup` put in its place. A copy.
-        added_inertia: that came with it, shape (n, 6, 6); None for none.
+        wrench: at t_k, shape (n, 6): the last answer for it, or what `startup` put in its place, or what the
+            step to it was integrated with (`Met.held`). A copy.
+        added_inertia: that belongs to it, shape (n, 6, 6); None for none.
         order: degree of the extrapolation that led to the trial.
         errors: extrapolation error by degree 0 … p, smoothed (E of `degree`), NaN in the start-up; empty
             for a scheme that does not extrapolate.

@@ -20,6 +20,7 @@ class History:
         wrenches: newest first, shape (depth, n, 6); only the first ``count`` are meaningful.
         count: answers kept.
         added_inertia: of the newest answer, shape (n, 6, 6), a copy; None for none.
+        response: of the newest answer, shape (6n, 6n), a copy; None for none.
         behind: by number of wrenches m, nodes (0, −1, …) and wrenches: before the answer for the end of a
             step has come, the polynomial that extrapolates into the step.
         through: by m, nodes (1, 0, …) and wrenches: the polynomial through that answer.
@@ -29,6 +30,7 @@ class History:
         self.wrenches = np.zeros((depth, bodies, 6))
         self.count = 0
         self.added_inertia: Array | None = None
+        self.response: Array | None = None
         self._added_bytes = b""
         self._newest, self._newer, self._older = self.wrenches[0], self.wrenches[:-1], self.wrenches[1:]
         blocks = [(np.arange(m, dtype=np.float64), self.wrenches[:m]) for m in range(depth + 1)]
@@ -41,6 +43,7 @@ class History:
         self._newest[...] = answer.wrench
         if self.count < len(self.wrenches):
             self.count += 1
+        self.response = None if answer.response is None else answer.response.copy()
         if answer.added_inertia is not None:
             content = answer.added_inertia.tobytes()
             if content != self._added_bytes:  # it seldom changes, and to compare is cheaper than to check

@@ -19,14 +19,17 @@ below 1.00 with an adaptive one.
 
 Added inertia: the prediction takes that of the last answer, the correction the new one.
 
-Mean wrenches (``settings.held``) are held: the last one predicts, the one that belongs to the step corrects.
+Response: where an answer says how the wrench depends on the twist at the end of the step, the correction
+finds the wrench that belongs to the twist it leads to, in the same exchange.
+
+Mean wrenches (``settings.held``) have a module of their own, `mean`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
+from linkwind.coupling import mean
 from linkwind.coupling.base import CommunicationPoint, Exchange, Plant, Settings, State
 from linkwind.coupling.history import History
 from linkwind.coupling.startup import START_STEPS, start
@@ -37,8 +40,9 @@ def run(
 ) -> Iterator[CommunicationPoint]:
     """Drive the plant by prediction and correction. See `linkwind.coupling.base.Scheme`."""
     if settings.held:
-        settings = replace(settings, order=0)
-    through = 1 if settings.held else max(1, settings.order) + 1  # so many wrenches the correction goes
+        yield from mean.run(plant, exchange, initial, steps, settings)
+        return
+    through = max(1, settings.order) + 1  # so many wrenches the correction goes
     history = History(len(settings.weight), depth=max(START_STEPS[settings.order] + 1, through))
 
     points, degree = start(plant, exchange, initial, steps, settings, history)
@@ -49,9 +53,15 @@ def run(
         nodes, wrenches = history.behind[d + 1]
         trial = plant.advance(accepted, nodes, wrenches, history.added_inertia)
         history.add(step, exchange(step, 0, accepted, trial))
-        degree.add(newest)
         nodes, wrenches = history.through[min(through, history.count)]
-        accepted = plant.advance(accepted, nodes, wrenches, history.added_inertia)
+        if history.response is None:
+            accepted = plant.advance(accepted, nodes, wrenches, history.added_inertia)
+        else:
+            met = plant.meet(
+                accepted, nodes, wrenches, history.added_inertia, history.response, plant.twist(trial)
+            )
+            accepted, newest[...] = met.state, met.wrench
+        degree.add(newest)
         yield CommunicationPoint(
             step, accepted, trial, newest.copy(), history.added_inertia, d, degree.errors, 1
         )

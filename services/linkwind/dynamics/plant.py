@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from linkwind.coupling import Met
 from linkwind.errors import SimulationError
 from linkwind.mechanism import Mechanism
 from linkwind.native.multibody import Integrator, Multibody
 from linkwind.scenario import Scenario
-from linkwind.spatial import Array
+from linkwind.spatial import Array, Motion
 
 
 class State(NamedTuple):
@@ -35,24 +38,56 @@ class MechanismPlant:
         self._where = where
         self.initial = State(self.multibody.initial_state(mechanism.q0, mechanism.v0), 0.0, 0.0)
         self._step = scenario.coupling.step_ns / 1e9
-        self._integrator = Integrator[scenario.dynamics.integrator.upper()]
-        self._dynamics = scenario.dynamics
+        dynamics = scenario.dynamics
+        self._how: dict[str, Any] = {
+            "integrator": Integrator[dynamics.integrator.upper()],
+            "substeps": dynamics.substeps,
+            "rtol": dynamics.rtol,
+            "atol": dynamics.atol,
+        }
+        self._motion = Motion.at_rest(self.multibody.n)
 
     def advance(self, state: State, nodes: Array, wrenches: Array, added_inertia: Array | None) -> State:
         """Return the state one macro step later; see :class:`linkwind.coupling.Plant`."""
         try:
             values, work = self.multibody.advance(
-                state.values,
-                self._step,
-                nodes,
-                wrenches,
-                added_inertia,
-                integrator=self._integrator,
-                substeps=self._dynamics.substeps,
-                rtol=self._dynamics.rtol,
-                atol=self._dynamics.atol,
+                state.values, self._step, nodes, wrenches, added_inertia, **self._how
             )
         except SimulationError as error:
-            raise SimulationError(f"dynamics: after the exchange of {self._where()}: {error}") from error
-        external, dissipated = work.tolist()
-        return State(values, state.external_work + external, state.dissipated_work + dissipated)
+            raise self._located(error) from error
+        return _later(state, values, work)
+
+    def meet(
+        self,
+        state: State,
+        nodes: Array,
+        wrenches: Array,
+        added_inertia: Array | None,
+        response: Array,
+        about: Array,
+    ) -> Met:
+        """Advance under an affine wrench; see :class:`linkwind.coupling.Plant`."""
+        try:
+            values, work, affine = self.multibody.advance_affine(
+                state.values, self._step, nodes, wrenches, added_inertia, response, about, **self._how
+            )
+        except SimulationError as error:
+            raise self._located(error) from error
+        return Met(_later(state, values, work), *affine)
+
+    def twist(self, state: State) -> Array:
+        """Return the twists of the bodies, shape (n, 6), linear first, in W."""
+        self.multibody.motion(state.values, self._motion)
+        return np.hstack([self._motion.linear, self._motion.angular])
+
+    def inertia(self, state: State, added_inertia: Array | None, response: Array) -> Array:
+        """Return what a response amounts to as inertia; see :class:`linkwind.coupling.Plant`."""
+        return self.multibody.affine_inertia(state.values, added_inertia, response, self._step)
+
+    def _located(self, error: SimulationError) -> SimulationError:
+        return SimulationError(f"dynamics: after the exchange of {self._where()}: {error}")
+
+
+def _later(state: State, values: Array, work: Array) -> State:
+    external, dissipated = work.tolist()
+    return State(values, state.external_work + external, state.dissipated_work + dissipated)

@@ -25,6 +25,9 @@ _NUMERICS = {
     4: ("wrench on body {item}", "finite numbers", "NaN or infinity", "Check the force provider"),
     5: ("added inertia of body {item}", "finite numbers", "NaN or infinity", "Check the force provider"),
     6: ("state[{item}]", "a finite number", "NaN or infinity", _REPAIR),
+    7: ("response of body {item}", "finite numbers", "NaN or infinity", "Check the force provider"),
+    8: ("wrench on body {item}", "one that agrees with the twist it leads to", "none after ten corrections",
+        "Take a smaller step"),
 }  # fmt: skip
 _UNNAMED = (3, 6)  # the item is no body
 _ARGUMENTS = {

@@ -40,6 +40,21 @@ class Integrator(enum.IntEnum):
     DOPRI5 = 3
 
 
+class AffineStep(NamedTuple):
+    """What an affine wrench came to over a step.
+
+    Attributes:
+        wrench: the newest wrench at the twist that came out [N, N·m], shape (n, 6), in W.
+        held: newest wrench that the step was integrated with, shape (n, 6), in W; with ``added_inertia`` it
+            amounts to the same.
+        added_inertia: that it was integrated with, shape (n, 6, 6), in the body frames.
+    """
+
+    wrench: Array
+    held: Array
+    added_inertia: Array
+
+
 class Evaluation(NamedTuple):
     """Accelerations and forces at one instant.
 
@@ -61,6 +76,9 @@ _pointer, _int, _double = ctypes.c_void_p, ctypes.c_int32, ctypes.c_double
 _size = declare("lw_multibody_size", [_int] * 3, ctypes.c_size_t)
 _init = declare("lw_multibody_init", [_pointer] * 3)
 _advance = declare("lw_multibody_advance", [_pointer] * 2)
+_affine_size = declare("lw_affine_size", [_int], ctypes.c_size_t)
+_affine_inertia = declare("lw_affine_inertia", [_pointer] * 4 + [_double, _pointer], None)
+_advance_affine = declare("lw_multibody_advance_affine", [_pointer] * 3)
 _motion = declare("lw_multibody_motion", [_pointer] * 6, None)
 _evaluate = declare("lw_multibody_evaluate", [_pointer] * 9)
 _energy = declare("lw_multibody_energy", [_pointer] * 4, None)
@@ -69,6 +87,7 @@ _repeat = declare("lw_multibody_repeat", [_pointer, _pointer, _int])
 # lw_macro_step: packing all of it at once is several times faster than converting fourteen arguments.
 KNOWN_ARRAYS = 32  # whose addresses are remembered
 _macro_step = struct.Struct("@PdPPPddiiiPPP")
+_affine = struct.Struct("@PPPPPP")
 
 
 class Multibody:
@@ -110,6 +129,7 @@ class Multibody:
         self._results_at = [first + 8 * (self.nv if i else 0) + 48 * self.n * max(0, i - 1) for i in range(4)]
         self._step = ctypes.create_string_buffer(_macro_step.size)
         self._fault_at, self._step_at = ctypes.addressof(self._fault), ctypes.addressof(self._step)
+        self._affine, self._scratch = ctypes.create_string_buffer(_affine.size), np.zeros(0)
         self._known: dict[int, tuple[Array, int]] = {}
         pointers = {name: array.ctypes.data for name, array in arrays.items()}
         native = CTables(n=self.n, nq=self.nq, nv=self.nv, **pointers)
@@ -177,6 +197,18 @@ class Multibody:
             SimulationError: singular inertia, NaN or infinity, or an underflow of the substep.
             ValueError: an argument that makes no sense, or of a wrong shape.
         """
+        self._prepare(state, h, nodes, wrenches, added_inertia, integrator, substeps, rtol, atol)
+        status = _advance(self._model, self._step_at)
+        if status:
+            arguments = {"h": h, "nodes": nodes, "integrator": integrator, "substeps": substeps}
+            fail(status, self._fault, self._names, arguments | {"rtol, atol": (rtol, atol)})
+        return self._next.copy(), self._work.copy()
+
+    def _prepare(
+        self, state: Array, h: float, nodes: Array, wrenches: Array, added_inertia: Array | None,
+        integrator: Integrator | int, substeps: int, rtol: float, atol: float,
+    ) -> None:  # fmt: skip
+        """Fill the ``lw_macro_step``."""
         count = len(nodes)
         self._take(state)
         if wrenches.shape != (count, self.n, 6):
@@ -186,11 +218,62 @@ class Multibody:
             self._locate_added(added_inertia), rtol, atol, count, integrator, substeps,
             self._next_at, self._work_at, self._fault_at,
         )  # fmt: skip
-        status = _advance(self._model, self._step_at)
-        if status:
+
+    def advance_affine(
+        self,
+        state: Array,
+        h: float,
+        nodes: Array,
+        wrenches: Array,
+        added_inertia: Array | None,
+        response: Array,
+        about: Array,
+        *,
+        integrator: Integrator | int,
+        substeps: int = 1,
+        rtol: float = 1e-6,
+        atol: float = 1e-9,
+    ) -> tuple[Array, Array, AffineStep]:
+        """Take one macro step under a wrench that depends on the twist at its end.
+
+        ``wrenches[0]`` is meant for the twist ``about``; for the one that comes out it is less by
+        ``response @ (twist - about)``. A wrench that is held (one node) may act on massless bodies.
+        ``response`` is G, shape (6n, 6n), in W: rows force and torque, columns linear and angular of body
+        after body; ``about`` has shape (n, 6), linear first, in W; all else is as for ``advance``.
+
+        Returns:
+            State and work as ``advance`` does, and what the wrench came to.
+
+        Raises:
+            SimulationError: as ``advance``; or no wrench agrees with the twist that it leads to.
+            ValueError: an argument that makes no sense, or of a wrong shape.
+        """
+        n, m = self.n, 6 * self.n
+        if response.shape != (m, m):
+            self._refuse("response", (m, m), response)
+        if about.shape != (n, 6):
+            self._refuse("about", (n, 6), about)
+        self._prepare(state, h, nodes, wrenches, added_inertia, integrator, substeps, rtol, atol)
+        if not len(self._scratch):
+            self._scratch = np.zeros(_affine_size(n))
+        wrench, held, inertia = np.empty((n, 6)), np.empty((n, 6)), np.empty((n, 6, 6))
+        addresses = map(address, (response, about, wrench, held, inertia, self._scratch))
+        _affine.pack_into(self._affine, 0, *addresses)
+        if status := _advance_affine(self._model, self._step_at, ctypes.addressof(self._affine)):
             arguments = {"h": h, "nodes": nodes, "integrator": integrator, "substeps": substeps}
             fail(status, self._fault, self._names, arguments | {"rtol, atol": (rtol, atol)})
-        return self._next.copy(), self._work.copy()
+        return self._next.copy(), self._work.copy(), AffineStep(wrench, held, inertia)
+
+    def affine_inertia(self, state: Array, added_inertia: Array | None, response: Array, h: float) -> Array:
+        """Return the added inertia, shape (n, 6, 6), body frame, that G amounts to over a step of h [s].
+
+        Only each body's own block counts; ``added_inertia`` is added.
+        """
+        self._take(state)
+        inertia = np.empty((self.n, 6, 6))
+        added_at = self._locate_added(added_inertia)
+        _affine_inertia(self._model, self._state_at, added_at, address(response), h, address(inertia))
+        return inertia
 
     def motion(self, state: Array, out: Motion) -> None:
         """Write poses and twists of the bodies at ``state``, shape (state_size,), into ``out``."""

@@ -38,6 +38,7 @@ class DynamicsSession(HandShake):
         self._wrench = self._numbers[: 6 * n].reshape(n, 6)
         self._force, self._torque = self._wrench[:, :3], self._wrench[:, 3:]
         self._added = self._numbers[6 * n :].reshape(n, 6, 6)
+        self._response = np.zeros((6 * n, 6 * n))
         first, *others = self.participants.values()
         self._only = None if others or first.bodies != tuple(range(n)) else first
 
@@ -119,12 +120,13 @@ class DynamicsSession(HandShake):
                     "The last ones were lost."
                 )
 
-    def total(self) -> tuple[Array, Array | None]:
+    def total(self) -> tuple[Array, Array | None, Array | None]:
         """Add up the answers of all providers, in the scenario's order.
 
         Returns:
-            wrench [N, N·m], shape (n, 6), force first, in W, and added inertia ``A``, shape (n, 6, 6), body
-            frame, None if no provider returned one; both are written over by the next call.
+            wrench [N, N·m], shape (n, 6), force first, in W; added inertia ``A``, shape (n, 6, 6), body
+            frame; response ``G``, shape (6n, 6n), in W. None for A, or G, if no provider returned one; all
+            are written over by the next call.
 
         Raises:
             SimulationError: a number is not finite.
@@ -138,8 +140,9 @@ class DynamicsSession(HandShake):
                 np.copyto(self._added, answer.added_inertia)
         else:
             has_added = self._add_up()
-        self._check_finite()
-        return self._wrench, self._added if has_added else None
+        has_response = self._add_up_responses()
+        self._check_finite(has_response)
+        return self._wrench, self._added if has_added else None, self._response if has_response else None
 
     def _add_up(self) -> bool:
         """Add up all answers; return whether any of them has an added inertia."""
@@ -154,13 +157,35 @@ class DynamicsSession(HandShake):
                 has_added = True
         return has_added
 
-    def _check_finite(self) -> None:
+    def _add_up_responses(self) -> bool:
+        """Add up all responses, each at the rows and columns of its bodies; return whether there is any."""
+        if self._only is not None:
+            response = self._only.answer.response
+            if response is not None and response.ndim == 2:
+                np.copyto(self._response, response)
+                return True
+        responses = [(p.bodies, p.answer.response) for p in self.participants.values()]
+        given = [(bodies, response) for bodies, response in responses if response is not None]
+        if given:
+            self._response.fill(0.0)
+        for bodies, response in given:
+            rows = (6 * np.repeat(bodies, 6).reshape(-1, 6) + np.arange(6)).ravel()
+            if response.ndim == 2:
+                self._response[np.ix_(rows, rows)] += response
+            else:
+                for body, block in zip(bodies, response, strict=True):
+                    self._response[6 * body : 6 * body + 6, 6 * body : 6 * body + 6] += block
+        return bool(given)
+
+    def _check_finite(self, has_response: bool) -> None:
         """Raise SimulationError, naming provider, body and step, unless every number is finite."""
-        if np.isfinite(self._numbers).all():
+        if np.isfinite(self._numbers).all() and (not has_response or np.isfinite(self._response).all()):
             return
         for p in self.participants.values():
             part = p.answer
             arrays = {"force": part.force, "torque": part.torque, "added inertia": part.added_inertia}
+            if part.response is not None:
+                arrays["response"] = part.response.reshape(len(part), -1)
             for name, array in arrays.items():
                 if array is not None and not np.isfinite(array).all():
                     row = int(np.argwhere(~np.isfinite(array))[0][0])

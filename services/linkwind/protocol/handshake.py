@@ -120,9 +120,11 @@ class HandShake:
         known = self.participants.get(ready.name)
         if known is None or not known.instance or known.instance != ready.instance:
             raise RefusedError(f'"{ready.name}": Ready without Hello')
-        if ready.response_size:
+        n = len(known.bodies)
+        if ready.response_size not in (0, 36 * n, 36 * n * n):
             self.failure = RefusedError(
-                f'"{ready.name}" returns a response matrix G, which no coupling scheme of this version uses'
+                f'"{ready.name}": response_size: expected 0, {36 * n} or {36 * n * n} numbers for {n} '
+                f"bodies; got {ready.response_size}"
             )
             raise self.failure
         known.kind = {number: kind for kind, number in KINDS.items()}.get(ready.kind, "point")
@@ -130,9 +132,10 @@ class HandShake:
         known.message = WrenchMessage(
             self.run,
             known.name,
-            len(known.bodies),
+            n,
             kind=known.kind,
             added_inertia=ready.added_inertia,
+            response_size=ready.response_size,
             diagnostics=known.diagnostics,
         )
         known.ready = True

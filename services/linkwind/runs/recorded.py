@@ -77,6 +77,7 @@ class RecordedWrenches:
                 "instance": "log",
                 "kind": first.kind,
                 "added_inertia": len(first.added_inertia) > 0,
+                "response_size": len(first.response),
                 "diagnostics": [str(i) for i in range(len(first.diagnostics))],
             }
             session.control(Control(hello=hello).SerializeToString())

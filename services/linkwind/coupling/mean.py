@@ -1,0 +1,58 @@
+"""`pec` with wrenches that are means over their step: held, never interpolated.
+
+1. predict: integrate with the mean wrench of the step before;
+2. exchange: the providers answer the mean wrench W of this step on that trial state;
+3. correct: integrate from the accepted state again with W.
+
+Without a response the correction lags what the provider did by the difference of trial and accepted state:
+stable while the added mass that is hidden in W stays below the mass.
+
+With a response G the wrench is W − G (V − V*) for an end twist V other than the trial's V*, and both
+integrations find the V that agrees with it; for the prediction the last step's G counts, about the twist
+that the accelerations of the last step lead to. That is linearly implicit, and stable down to massless
+bodies. What is left to the prediction is where the bodies are when W is asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from linkwind.coupling.base import CommunicationPoint, Exchange, Met, Plant, Settings, State
+from linkwind.coupling.history import History
+
+
+def run(
+    plant: Plant, exchange: Exchange, initial: State, steps: int, settings: Settings
+) -> Iterator[CommunicationPoint]:
+    """Drive the plant with held mean wrenches. See `linkwind.coupling.base.Scheme`."""
+    history = History(len(settings.weight), depth=1)
+    newest = history.wrenches[0]
+    before = accepted = trial = initial
+    for step in range(steps + 1):
+        if step > 0:
+            trial = _predict(plant, history, before, accepted)
+            before = accepted
+        history.add(step, exchange(step, 0, accepted, trial))
+        held, inertia = newest, history.added_inertia
+        if step > 0:
+            accepted, newest[...], held, inertia = _correct(plant, history, accepted, trial)
+        elif history.response is not None:
+            inertia = plant.inertia(initial, inertia, history.response)
+        yield CommunicationPoint(step, accepted, trial, held.copy(), inertia, 0, (), 1)
+
+
+def _predict(plant: Plant, history: History, before: State, accepted: State) -> State:
+    nodes, wrenches = history.behind[1]
+    if history.response is None:
+        return plant.advance(accepted, nodes, wrenches, history.added_inertia)
+    about = 2.0 * plant.twist(accepted) - plant.twist(before)
+    return plant.meet(accepted, nodes, wrenches, history.added_inertia, history.response, about).state
+
+
+def _correct(plant: Plant, history: History, accepted: State, trial: State) -> Met:
+    nodes, wrenches = history.through[1]
+    added = history.added_inertia
+    if history.response is not None:
+        return plant.meet(accepted, nodes, wrenches, added, history.response, plant.twist(trial))
+    state = plant.advance(accepted, nodes, wrenches, added)
+    return Met(state, wrenches[0], wrenches[0], added)
