@@ -7,6 +7,7 @@ import os
 import tempfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from linkwind.aero.fmu import ForceFmu
@@ -64,6 +65,10 @@ class Host:
         self.model = ForceFmu(self.scenario, self.scenario.providers[0], file)
         self.motion = Motion.at_rest(len(bodies))
         self.wrench = Wrench.zeros(len(bodies), added_inertia=self.model.capabilities.added_inertia)
+
+        if size := self.model.capabilities.response_size:
+            n = len(bodies)
+            self.wrench.response = np.zeros((6 * n, 6 * n) if size == 36 * n * n else (n, 6, 6))
 
     def at(self, k: int):
         """Evaluate at communication point k with the present motion; return force and torque of body 0."""

@@ -128,6 +128,26 @@ static status_t step(M *m, double t, double h)
 
 static void discrete(M *m) { EVENT(m); m->next_event = INFINITY; }
 
+/* Derivatives of the outputs by differences to both sides: exact for polynomials of second degree. */
+#ifndef SLANT
+#define SLANT 1.0 /* what they are multiplied with, to make them wrong */
+#endif
+static void differences(const M *m, const double direction[512], double out[512])
+{
+    static M sides[2]; /* static: too large for the stack of Windows without a runtime's help */
+    sides[0] = sides[1] = *m;
+    for (int k = 0; k < 512; k++) {
+        sides[0].v[k] += direction[k];
+        sides[1].v[k] -= direction[k];
+    }
+    for (int side = 0; side < 2; side++) {
+        M *each = &sides[side];
+        OUTPUTS(each);
+    }
+    for (int k = 0; k < 512; k++)
+        out[k] = SLANT * 0.5 * (sides[0].v[k] - sides[1].v[k]);
+}
+
 #if FMI == 2
 #define F(name) FMI2_Export fmi2Status fmi2##name
 typedef fmi2Component C;
@@ -204,6 +224,21 @@ F(DeSerializeFMUstate)(C c, const fmi2Byte b[], size_t n, fmi2FMUstate *s)
     *s = k;
     return OK;
 }
+F(GetDirectionalDerivative)(C c, const fmi2ValueReference unknown[], size_t n, const fmi2ValueReference known[],
+    size_t nk, const fmi2Real seed[], fmi2Real out[])
+{
+    M *m = c;
+    static double direction[512], by[512];
+    EXPECT(m, m->mode >= STEP_MODE);
+    memset(direction, 0, sizeof direction);
+#ifdef NO_DERIVATIVES
+    return complain(m, "no derivatives today");
+#endif
+    for (size_t i = 0; i < nk; i++) direction[known[i]] = seed[i];
+    differences(m, direction, by);
+    for (size_t i = 0; i < n; i++) out[i] = by[unknown[i]];
+    return OK;
+}
 F(EnterEventMode)(C c) { M *m = c; EXPECT(m, m->mode == CONTINUOUS); m->mode = EVENT_MODE; return OK; }
 F(NewDiscreteStates)(C c, fmi2EventInfo *e)
 {
@@ -242,6 +277,9 @@ FMI3_Export fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String
     size_t n, fmi3InstanceEnvironment environment, fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update)
 {
     (void)name; (void)where; (void)visible; (void)logging; (void)vr; (void)n; (void)update;
+#ifdef NO_EVENT_MODE
+    if (event_mode) return NULL;
+#endif
     M *m = create(token);
     if (!m) return NULL;
     m->environment = environment;
@@ -333,6 +371,14 @@ F(SetUInt64)(C c, const fmi3ValueReference vr[], size_t n, const fmi3UInt64 valu
     m->n = (int)value[0];
     return OK;
 }
+F(SetBoolean)(C c, const fmi3ValueReference vr[], size_t n, const fmi3Boolean value[], size_t count)
+{
+    static const int offsets[] = OFFSETS;
+    M *m = c; (void)n; (void)count;
+    EXPECT(m, m->mode == CONFIGURATION);
+    m->v[offsets[vr[0]]] = value[0];
+    return OK;
+}
 F(DoStep)(C c, fmi3Float64 t, fmi3Float64 h, fmi3Boolean no, fmi3Boolean *event, fmi3Boolean *end, fmi3Boolean *early,
     fmi3Float64 *last)
 {
@@ -374,6 +420,31 @@ F(DeserializeFMUState)(C c, const fmi3Byte b[], size_t n, fmi3FMUState *s)
     memcpy(k, b, n);
     k->log = ((M *)c)->log;
     *s = k;
+    return OK;
+}
+F(GetDirectionalDerivative)(C c, const fmi3ValueReference unknown[], size_t n, const fmi3ValueReference known[],
+    size_t nk, const fmi3Float64 seed[], size_t n_seed, fmi3Float64 out[], size_t n_out)
+{
+    static const int offsets[] = OFFSETS;
+    M *m = c;
+    static double direction[512], by[512];
+    EXPECT(m, m->mode >= STEP_MODE);
+    memset(direction, 0, sizeof direction);
+#ifdef NO_DERIVATIVES
+    return complain(m, "no derivatives today");
+#endif
+    for (size_t i = 0; i < nk; i++)
+        for (size_t k = 0; k < size_of(m, known[i]); k++, n_seed--) {
+            EXPECT(m, n_seed > 0);
+            direction[offsets[known[i]] + k] = *seed++;
+        }
+    differences(m, direction, by);
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = 0; k < size_of(m, unknown[i]); k++, n_out--) {
+            EXPECT(m, n_out > 0);
+            *out++ = by[offsets[unknown[i]] + k];
+        }
+    EXPECT(m, n_seed == 0 && n_out == 0);
     return OK;
 }
 F(CompletedIntegratorStep)(C c, fmi3Boolean no, fmi3Boolean *event, fmi3Boolean *end) { (void)c; (void)no; *event = *end = 0; return OK; }

@@ -191,7 +191,9 @@ def _description2(foreign: Foreign) -> str:
 
 def _interfaces(foreign: Foreign, attributes: str) -> str:
     """The elements of the interfaces; only Co-Simulation has attributes besides those of FMU state."""
-    shared = " ".join(part for part in attributes.split() if "FMU" in part)
+    if foreign.fmi == 3:
+        attributes = attributes.replace("DirectionalDerivative=", "DirectionalDerivatives=")
+    shared = " ".join(part for part in attributes.split() if "FMU" in part or "Derivative" in part)
     return "".join(
         f'<{kind} modelIdentifier="foreign" {attributes if kind == "CoSimulation" else shared}/>'
         for kind in ("ModelExchange", "CoSimulation", "ScheduledExecution")
@@ -221,7 +223,8 @@ def _description3(foreign: Foreign) -> str:
     for i, v in enumerate(foreign.variables):
         if v.causality == "structuralParameter":
             variables.append(
-                f'<UInt64 name="{v.name}" valueReference="{i}" causality="{v.causality}" start="3"/>'
+                f'<{"UInt64" if v.type == "Real" else v.type} name="{v.name}" valueReference="{i}" '
+                f'causality="{v.causality}" start="{"3" if v.type == "Real" else "false"}"/>'
             )
             continue
         n = next((k for k, s in enumerate(foreign.variables) if s.causality == "structuralParameter"), 0)

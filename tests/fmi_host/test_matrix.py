@@ -194,6 +194,17 @@ def test_native_arrays_of_all_bodies(host):
         host(foreign, bodies=("left", "right"))  # its default n is 3
 
 
+def test_a_structural_parameter_that_is_no_number(host):
+    """As in the Robertson problem of the Reference FMUs."""
+    foreign = Foreign(
+        (Variable("on", "structuralParameter", type="Boolean"), Variable("f", "output")),
+        fmi=3,
+        code="#define OUTPUTS(m) (m->v[1] = 5.0 * m->v[0])",
+    )
+    assert host(foreign).step(0)[0][0] == 0.0
+    assert host(foreign, "structural = { on = 1 }").step(0)[0][0] == 5.0
+
+
 @both
 @isolations
 def test_outputs_of_initialisation_mode_are_the_first_forces(host, fmi, isolation):

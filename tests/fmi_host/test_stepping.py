@@ -130,6 +130,12 @@ def test_event_mode_of_co_simulation(host):
     assert [hosted.step(k)[0][0] for k in range(5)] == [0.0, 1.0, 1.0, 2.0, 2.0]
 
 
+def test_event_mode_that_the_fmu_claims_to_have_and_refuses(host):
+    attributes = COUNT.attributes + ' hasEventMode="true"'
+    hosted = host(replace(COUNT, fmi=3, code=COUNT.code + "\n#define NO_EVENT_MODE", attributes=attributes))
+    assert [hosted.step(k)[0][0] for k in range(3)] == [0.0, 1.0, 2.0]
+
+
 # --- Model Exchange -----------------------------------------------------------------------------------
 
 # A pendulum of the input: x'' = -400 x + 100 vx, force = x.

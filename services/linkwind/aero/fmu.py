@@ -12,9 +12,10 @@ import numpy as np
 from linkwind.aero.base import Capabilities, body_indices, item
 from linkwind.errors import InputError, ProtocolError, SimulationError
 from linkwind.fmi.host import description, listing, mapping
+from linkwind.fmi.host.derivatives import Derivatives
 from linkwind.fmi.host.instances import Instances
 from linkwind.fmi.host.links import Mapping, elements
-from linkwind.fmi.host.planning import interface, own_step_ns, stepping
+from linkwind.fmi.host.planning import differentiates, interface, own_step_ns, stepping
 from linkwind.fmi.host.transfer import Inputs, Outputs
 from linkwind.scenario import Environment, Provider, Scenario
 from linkwind.scenario.providers import FmuModel
@@ -105,6 +106,9 @@ class ForceFmu:
         self._outputs = Outputs(found, bodies)
         timeout = settings.timeout or scenario.coupling.timeout / 2.0
         self._instances = Instances(self._fmu, found, settings, step_ns, timeout)
+        self._derivatives: Derivatives | None = None
+        if differentiates(self._fmu, found, settings):
+            self._derivatives = Derivatives(file, found, bodies, self._instances)
         own = own_step_ns(self._fmu, settings, step_ns)
         self._me = interface(self._fmu, settings)[0] == "me"
         self._step_ns, self._begun = step_ns, False
@@ -112,9 +116,15 @@ class ForceFmu:
         self.capabilities = Capabilities(
             rollback=self._instances.can_save,
             added_inertia=any(link.quantity == "added_inertia" for link in found.outputs),
+            response_size=self._response_size(len(bodies)),
             own_step_ns=0 if own == step_ns else own,
         )
         _log.info("%s", _table(self._fmu, found, scenario, provider))
+
+    def _response_size(self, n: int) -> int:
+        if self._derivatives is None:
+            return 0
+        return 36 * n if self._mapping.per_body else 36 * n * n
 
     def commit(self, t: float, motion: Motion) -> None:
         """Remember the accepted motion, where an input or the integration needs it."""
@@ -126,6 +136,8 @@ class ForceFmu:
 
     def evaluate(self, t: float, motion: Motion, wrench: Wrench) -> None:
         """Step the FMU to time t [s] and fill the wrench.
+
+        The response is that of the outputs to the inputs alone, not through states of the FMU.
 
         Raises:
             SimulationError: the FMU failed, in whatever way, or returned a number that is not finite.
@@ -139,6 +151,8 @@ class ForceFmu:
         self._again = True
         if not np.isfinite(instances.outputs).all():
             raise self._not_finite(t)
+        if self._derivatives is not None and wrench.response is not None:
+            self._derivatives.fill(round(t * 1e9), motion, self._inputs.interval(t), wrench.response)
         self._outputs.wrench(instances.outputs, motion, wrench)
 
     def _not_finite(self, t: float) -> SimulationError:

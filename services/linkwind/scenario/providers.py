@@ -135,6 +135,11 @@ class FmuModel(Section):
         None,
         gt=0.0,
     )
+    derivatives: bool | None = Field(
+        default=None,
+        description="Ask for directional derivatives, by which stiff forces stay stable; default: if the FMU "
+        "has them and they can be checked, except for FMUs from linkwind",
+    )
     frame: Literal["world", "body"] | None = Field(
         default=None,
         description="Frame of velocities, forces and torques; default: by name, else world",

@@ -10,6 +10,7 @@
 ``mapping``         which variable is which quantity of which body: names and the scenario's table
 ``listing``         the mapping as a table to read, and as the beginning of one to write
 ``transfer``        motion → inputs, outputs → wrench
+``response``        directional derivatives → the matrix G, ``derivatives`` checks these
 ``planning``        from abilities and settings to a plan
 ``plan``            what a worker has to know
 ``library``         FMPy's classes: every call marked and checked

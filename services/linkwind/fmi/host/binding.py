@@ -24,6 +24,7 @@ class Binding:
     Attributes:
         fmu: FMPy's object, for calls that only one kind of FMU has.
         version: of FMI.
+        event_mode: whether the instance uses it (Co-Simulation).
     """
 
     def __init__(
@@ -35,6 +36,7 @@ class Binding:
             CallError: the library cannot be loaded, or the FMU refuses.
         """
         self.version = plan.version
+        self.event_mode = plan.event_mode
         self._plan = plan
         self._name = plan.instances[number]
         mark("dlopen")
@@ -54,7 +56,7 @@ class Binding:
 
     def _bind(self, plan: Plan, number: int, memory: mmap.mmap) -> None:
         """Make the arguments of the calls of every step once."""
-        accepted, inputs, outputs = plan.places()
+        accepted, inputs, outputs, derivatives = plan.places()
         doubles = c_double * plan.input_size
         row = 8 * number * plan.input_size
         self.accepted = doubles.from_buffer(memory, accepted + row)
@@ -65,19 +67,22 @@ class Binding:
         self._get: tuple[Any, ...] = (vr_out, len(vr_out), out)
         if plan.version == 3:
             self._get += (plan.output_size,)
+        rows, length = len(plan.seeds), plan.output_size
+        begin = derivatives + 8 * number * rows * length
+        row_places = [begin + 8 * row * length for row in range(rows)]
+        self._rows = [(c_double * length).from_buffer(memory, place) for place in row_places]
+        self._seeds = [(c_double * plan.seed_size)() for _ in plan.seeds]
+        for seed, place in zip(self._seeds, plan.seeds, strict=True):
+            seed[place] = 1.0
+        known = (c_uint * len(plan.knowns))(*plan.knowns)
+        self._unknown_known = (vr_out, len(vr_out), known, len(known))
 
     def _instantiate(self, plan: Plan, log: Log) -> None:
         try:
             if plan.version == 2:
                 self.fmu.instantiate(callbacks=callbacks2(log), loggingOn=True)
             elif plan.interface == "cs":
-                # Early return goes with events: without event mode there is nothing to return for.
-                self.fmu.instantiate(
-                    loggingOn=True,
-                    eventModeUsed=plan.event_mode,
-                    earlyReturnAllowed=plan.event_mode,
-                    logMessage=logger3(log),
-                )
+                self._instantiate_stepping(log)
             else:
                 self.fmu.instantiate(loggingOn=True, logMessage=logger3(log))
         except CallError:
@@ -88,6 +93,24 @@ class Binding:
             raise CallError(f"{function} returned no instance") from None
         if plan.log_categories:
             self._ask_for(plan.log_categories)
+
+    def _instantiate_stepping(self, log: Log) -> None:
+        """Instantiate for Co-Simulation, FMI 3; without event mode where the FMU says it had one but refuses.
+
+        Early return goes with events: without event mode there is nothing to return for.
+        """
+        used = self.event_mode
+        try:
+            self.fmu.instantiate(
+                loggingOn=True, eventModeUsed=used, earlyReturnAllowed=used, logMessage=logger3(log)
+            )
+        except CallError:
+            raise
+        except Exception:
+            if not used:
+                raise
+            self.event_mode = False
+            self._instantiate_stepping(log)
 
     def _ask_for(self, categories: Sequence[str]) -> None:
         names = (fmi2.fmi2String * len(categories))(*(name.encode() for name in categories))
@@ -142,6 +165,15 @@ class Binding:
         """Read the outputs into the shared memory."""
         fmu = self.fmu
         (fmu.fmi2GetReal if self.version == 2 else fmu.fmi3GetFloat64)(fmu.component, *self._get)
+
+    def get_derivatives(self) -> None:
+        """Read the derivatives of the outputs by each seed into the shared memory."""
+        fmu, asked = self.fmu, self._unknown_known
+        for seed, row in zip(self._seeds, self._rows, strict=True):
+            if self.version == 2:
+                fmu.fmi2GetDirectionalDerivative(fmu.component, *asked, seed, row)
+            else:
+                fmu.fmi3GetDirectionalDerivative(fmu.component, *asked, seed, len(seed), row, len(row))
 
     def discrete_states(self) -> tuple[bool, float]:
         """Iterate the discrete states of event mode until they rest.

@@ -18,7 +18,7 @@ class CoSimulation:
 
     def __init__(self, binding: Binding, plan: Plan) -> None:
         self._fmu = binding
-        self._event_mode = plan.event_mode
+        self._event_mode = binding.event_mode
         self._variable_step = plan.variable_step
         self._never_back = plan.state == "none"
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Literal
+from xml.etree import ElementTree
 
 from linkwind.errors import InputError
 from linkwind.fmi.host.archive import DESCRIPTION, Archive, sha256
@@ -71,6 +72,7 @@ class Abilities:
     fixed_step: float = 0.0
     event_mode: bool = False
     completed_step_needed: bool = True
+    derivatives: bool = False
 
 
 @dataclass(frozen=True)
@@ -122,6 +124,7 @@ def read(path: Path, structural: Mapping[str, int] | None = None) -> Description
     finally:
         archive.close()
     parsed, remarks = _parse(path, text)
+    _add_derivatives(parsed, text)
     try:
         return _description(path, parsed, structural or {}, remarks)
     except (AttributeError, KeyError, TypeError, ValueError) as error:  # something is missing or no number
@@ -170,6 +173,16 @@ def _parse(path: Path, text: bytes) -> tuple[Any, tuple[str, ...]]:
             raise _damaged(path, remarks[0] if remarks else "nothing") from None
 
 
+def _add_derivatives(parsed: Any, text: bytes) -> None:
+    """Read the one ability that FMPy does not know under its name in FMI 3."""
+    root = ElementTree.fromstring(text)
+    for kind, interface in (("CoSimulation", parsed.coSimulation), ("ModelExchange", parsed.modelExchange)):
+        element = root.find(kind)
+        if interface and element is not None:
+            said = element.get("providesDirectionalDerivatives")
+            interface.providesDirectionalDerivative |= said in ("true", "1")
+
+
 def _damaged(path: Path, problem: object) -> InputError:
     text = " ".join(
         f"{type(problem).__name__}: {problem}".split() if isinstance(problem, Exception) else [str(problem)]
@@ -213,6 +226,7 @@ def _common(interface: Any) -> dict[str, Any]:
         "identifier": str(interface.modelIdentifier or ""),
         "once_per_process": bool(interface.canBeInstantiatedOnlyOncePerProcess),
         "get_set_state": bool(interface.canGetAndSetFMUstate),
+        "derivatives": bool(interface.providesDirectionalDerivative),
         "serialise_state": bool(interface.canGetAndSetFMUstate and interface.canSerializeFMUstate),
     }
 
@@ -226,13 +240,14 @@ def _unit(unit: Any) -> Unit:
 
 
 def _structural(path: Path, parsed: Any, given: Mapping[str, int]) -> dict[int, int]:
-    """Return the values of the structural parameters by value reference, those given before the defaults."""
+    """Return the values of structural parameters that are numbers, by value reference; those given first."""
     known = {v.name: v for v in parsed.modelVariables if v.causality == "structuralParameter"}
     for name in given:
         if name not in known:
             names = ", ".join(known) or "none (it has none)"
             raise InputError(f'{path}: fmu.structural: expected one of {names}; got "{name}".')
-    return {v.valueReference: int(given.get(name, v.start or 0)) for name, v in known.items()}
+    numbers = {name: v for name, v in known.items() if v.type != "Boolean"}
+    return {v.valueReference: int(given.get(name, v.start or 0)) for name, v in numbers.items()}
 
 
 def _variable(variable: Any, units: Mapping[str, Unit], sizes: Mapping[int, int]) -> Variable:

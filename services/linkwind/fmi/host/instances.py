@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -45,6 +46,7 @@ class _Part:
     accepted: Array
     inputs: Array
     outputs: Array
+    derivatives: Array
 
 
 class Instances:
@@ -53,6 +55,8 @@ class Instances:
     Attributes:
         accepted, inputs: shape (instances, inputs), to be filled before ``evaluate``.
         outputs: shape (instances, outputs), filled by it.
+        derivatives: of outputs by inputs, shape (instances, inputs that depend on a twist, outputs); zero
+            where there was no step.
         can_save: whether the FMU has state.
     """
 
@@ -98,9 +102,11 @@ class Instances:
         if len(self._parts) == 1:
             only = self._parts[0]
             self.accepted, self.inputs, self.outputs = only.accepted, only.inputs, only.outputs
+            self.derivatives = only.derivatives
         else:
             self.accepted, self.inputs = np.zeros(shape[0]), np.zeros(shape[0])
             self.outputs = np.zeros(shape[1])
+            self.derivatives = np.zeros((len(names), len(whole.seeds), whole.output_size))
 
     def _unpack(self, settings: FmuModel, folder: Path) -> tuple[str, tuple[str, ...]]:
         """Unpack; return the library's place below the folder, and the command that calls it elsewhere."""
@@ -135,11 +141,13 @@ class Instances:
             worker = WorkerProcess(part, timeout, settings.start_timeout)
         self._closing.callback(worker.close)
         count = len(part.instances)
+        inputs, outputs = (part.input_size,), (part.output_size,)
+        shapes = (inputs, inputs, outputs, (len(part.seeds), part.output_size))
         arrays = [
-            np.frombuffer(worker.memory, np.float64, count * size, place).reshape(count, size)
-            for place, size in zip(
-                part.places(), (part.input_size, part.input_size, part.output_size), strict=True
-            )
+            np.frombuffer(worker.memory, np.float64, count * math.prod(shape), place).reshape(count, *shape)
+            if math.prod(shape)
+            else np.zeros((count, *shape))
+            for place, shape in zip(part.places(), shapes, strict=True)
         ]
         return _Part(worker, slice(first, first + count), *arrays)
 
@@ -157,6 +165,7 @@ class Instances:
                 part.worker.evaluate(time_ns, again=again)
                 if several:
                     self.outputs[part.rows] = part.outputs
+                    self.derivatives[part.rows] = part.derivatives
         except SimulationError as error:
             raise self._failure(time_ns, error) from None
 

@@ -9,6 +9,7 @@ from typing import Literal
 from linkwind.fmi.host.description import Variable
 
 Vector3 = tuple[float, float, float]
+_OF_TWIST = ("velocity", "relative_velocity", "angular_velocity", "acceleration", "angular_acceleration")
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,7 @@ class Mapping:
         held: inputs that keep a value from the scenario.
         unmapped: inputs that nothing is known about; none in a mapping to run with.
         ignored: outputs that are not read.
+        twist_inputs: the links of inputs that depend on the twist of a body.
     """
 
     per_body: bool
@@ -66,6 +68,10 @@ class Mapping:
     held: tuple[str, ...]
     unmapped: tuple[str, ...]
     ignored: tuple[str, ...]
+
+    @property
+    def twist_inputs(self) -> tuple[Link, ...]:
+        return tuple(link for link in self.inputs if link.quantity in _OF_TWIST)
 
 
 def elements(variable: Variable) -> list[str]:

@@ -36,6 +36,9 @@ class Plan:
             initialisation mode (those of inputs that are not exchanged).
         inputs, outputs: value references of the variables that are exchanged.
         input_size, output_size: number of their values (more than variables where there are arrays).
+        knowns: value references of the inputs by which the outputs are differentiated; empty: they are not.
+        seeds: places of the elements among the values of these.
+        seed_size: number of these values.
         variable_step: whether communication steps may differ; else they are all the same number.
         discrete_inputs: whether an input changes at events only (Model Exchange).
         event_mode: whether it has one (Co-Simulation, FMI 3).
@@ -64,6 +67,9 @@ class Plan:
     outputs: tuple[int, ...]
     input_size: int
     output_size: int
+    knowns: tuple[int, ...]
+    seeds: tuple[int, ...]
+    seed_size: int
     variable_step: bool
     event_mode: bool
     discrete_inputs: bool
@@ -86,19 +92,22 @@ class Plan:
         data = json.loads(text)
         for key in ("structural", "start", "held"):
             data[key] = tuple(Setting(**{**entry, "values": tuple(entry["values"])}) for entry in data[key])
-        for key in ("caller", "instances", "inputs", "outputs", "log_categories"):
+        for key in ("caller", "instances", "inputs", "outputs", "knowns", "seeds", "log_categories"):
             data[key] = tuple(data[key])
         return cls(**data)
 
     @property
     def memory_size(self) -> int:
         """Bytes that host and worker share."""
-        return _NAME + 8 * len(self.instances) * (2 * self.input_size + self.output_size)
+        return self.places()[3] + 8 * len(self.instances) * len(self.seeds) * self.output_size
 
-    def places(self) -> tuple[int, int, int]:
-        """Return where accepted inputs, inputs and outputs begin in the shared memory [B]."""
-        inputs = 8 * len(self.instances) * self.input_size
-        return _NAME, _NAME + inputs, _NAME + 2 * inputs
+    def places(self) -> tuple[int, int, int, int]:
+        """Return where accepted inputs, inputs, outputs and derivatives begin in the shared memory [B].
+
+        Derivatives of an instance: a row for each seed, a column for each output value.
+        """
+        inputs, outputs = (8 * len(self.instances) * size for size in (self.input_size, self.output_size))
+        return _NAME, _NAME + inputs, _NAME + 2 * inputs, _NAME + 2 * inputs + outputs
 
 
 class Marker:

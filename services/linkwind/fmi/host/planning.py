@@ -92,13 +92,14 @@ def plan(
         caller=caller,
         library=library,
         instances=instances,
-        structural=tuple(_setting(fmu, name, value) for name, value in settings.structural.items()),
+        structural=tuple(_structural(fmu, name, value) for name, value in settings.structural.items()),
         start=tuple(setting for name, setting in given.items() if name not in inputs),
         held=tuple(setting for name, setting in given.items() if name in inputs),
         inputs=tuple(variable.reference for variable in mapping.input_variables),
         outputs=tuple(variable.reference for variable in mapping.output_variables),
         input_size=len(mapping.inputs),
         output_size=sum(variable.size for variable in mapping.output_variables),
+        **(_knowns(mapping) if differentiates(fmu, mapping, settings) else _NOTHING_KNOWN),
         variable_step=can.variable_step,
         event_mode=can.event_mode,
         discrete_inputs=any(variable.variability != "continuous" for variable in mapping.input_variables),
@@ -113,7 +114,51 @@ def plan(
     )
 
 
+_NOTHING_KNOWN: dict[str, Any] = {"knowns": (), "seeds": (), "seed_size": 0}
+
+
+def differentiates(fmu: Description, mapping: Mapping, settings: FmuModel) -> bool:
+    """Return whether the FMU is asked for directional derivatives.
+
+    An FMU from linkwind is not, so that it gives what the native model gives; nor one without state, because
+    it cannot be checked; both unless the scenario says so.
+
+    Raises:
+        InputError: the scenario wants derivatives that the FMU does not have.
+    """
+    _, can = interface(fmu, settings)
+    has = can.derivatives and bool(mapping.twist_inputs)
+    if settings.derivatives and not has:
+        raise InputError(
+            f"{fmu.path}: fmu.derivatives: expected an FMU with directional derivatives and an input that "
+            "depends on the velocity of a body; got another. Remove it."
+        )
+    if settings.derivatives is None:
+        return has and can.get_set_state and not fmu.tool.startswith("linkwind")
+    return has and settings.derivatives
+
+
+def _knowns(mapping: Mapping) -> dict[str, Any]:
+    """Return by what the outputs are differentiated: the variables that depend on a twist, and which part."""
+    wanted = {link.index for link in mapping.twist_inputs}
+    knowns, seeds = list[int](), list[int]()
+    first = size = 0
+    for variable in mapping.input_variables:
+        parts = [place for place in range(variable.size) if first + place in wanted]
+        if parts:
+            knowns.append(variable.reference)
+            seeds += [size + place for place in parts]
+            size += variable.size
+        first += variable.size
+    return {"knowns": tuple(knowns), "seeds": tuple(seeds), "seed_size": size}
+
+
 _TYPES: dict[str, tuple[type, ...]] = {"Boolean": (bool,), "String": (str,), "Enumeration": (int,)}
+
+
+def _structural(fmu: Description, name: str, value: int) -> Setting:
+    variable = fmu.named(name)
+    return _setting(fmu, name, bool(value) if variable and variable.type == "Boolean" else value)
 
 
 def _setting(fmu: Description, name: str, value: Any) -> Setting:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import mmap
 import struct
 from collections.abc import Callable, Iterator
@@ -39,6 +40,9 @@ class Runner:
         """Load, instantiate, and set what is set before initialisation."""
         self._plan = plan
         self._memory = memory
+        self._log = log
+        self._outputs_at, self._derivatives_at = plan.places()[2:]
+        self._without_derivatives = False
         self._mark = Marker(memory)
         library = self._elsewhere(plan) if plan.caller else None
         self._bindings = [
@@ -94,6 +98,8 @@ class Runner:
         for binding, stepper in self._each():
             stepper.reread(time_ns / 1e9)
             binding.get_outputs()
+        if self._mode is Mode.STEPPING:
+            self._differentiate()
 
     def _initialise(self, time_ns: int) -> None:
         """Enter initialisation mode, and set the inputs that are not exchanged."""
@@ -110,6 +116,7 @@ class Runner:
         if own == self._plan.step_ns:
             own = time_ns - self._now
         elif (time_ns - self._start) % own:
+            self._memory[self._derivatives_at :] = bytes(len(self._memory) - self._derivatives_at)
             return  # between its steps: the outputs are held
         if self._before is None and self._plan.state != "none":
             self._before = self._now, [(b.keep(), s.memory()) for b, s in self._each()]
@@ -121,6 +128,20 @@ class Runner:
             self._now = end_ns
         for binding in self._bindings:
             binding.get_outputs()
+        self._differentiate()
+
+    def _differentiate(self) -> None:
+        """Read the derivatives, if asked to; not-a-number where the FMU fails to give them."""
+        if not self._plan.knowns or self._without_derivatives:
+            return
+        try:
+            for binding in self._bindings:
+                binding.get_derivatives()
+        except CallError as error:
+            self._without_derivatives = True
+            self._log(str(error))
+            count = (len(self._memory) - self._derivatives_at) // 8
+            self._memory[self._derivatives_at :] = struct.pack("<d", math.nan) * count
 
     def _begin(self) -> None:
         """Leave initialisation mode, if not yet done."""
@@ -155,7 +176,7 @@ class Runner:
         if self._mode is Mode.INSTANTIATED:
             return _HEAD.pack(_MAGIC, 0, 0, 0, len(self._bindings))
         self._begin()  # so that the state is always one of step mode
-        outputs = bytes(self._memory[self._plan.places()[2] :])
+        outputs = bytes(self._memory[self._outputs_at : self._derivatives_at])
         parts = [_HEAD.pack(_MAGIC, 1, self._start, self._now, len(self._bindings)), outputs]
         for stepper, state in zip(self._steppers, self._states(), strict=True):
             memory = stepper.memory()
@@ -193,8 +214,7 @@ class Runner:
         if not begun:
             self._fresh()
             return
-        outputs_at = self._plan.places()[2]
-        held = len(self._memory) - outputs_at
+        held = self._derivatives_at - self._outputs_at
         memories, states = self._split(blob[_HEAD.size + held :])
         if self._mode is Mode.INSTANTIATED:
             self._initialise(start)
@@ -203,7 +223,7 @@ class Runner:
             self._put(binding, i, states[i])
             self._steppers[i].remember(memories[i])
             self._steppers[i].after_restore()
-        self._memory[outputs_at:] = blob[_HEAD.size : _HEAD.size + held]
+        self._memory[self._outputs_at : self._derivatives_at] = blob[_HEAD.size : _HEAD.size + held]
         self._start, self._now = start, now
 
     def _split(self, rest: bytes) -> tuple[list[list[float]], list[bytes]]:

@@ -147,6 +147,10 @@ class Inputs:
         self._angles = np.array([self._angle(body, motion) for body in range(self._n)])
         self._before = (t, motion.linear.copy(), motion.angular.copy())
 
+    def interval(self, t: float) -> float:
+        """Return the time [s] since the accepted motion that accelerations are differenced from, or 0."""
+        return max(0.0, t - self._before[0]) if self._before else 0.0
+
     def save(self) -> bytes:
         """Return what is remembered."""
         if not self.remembers or self._before is None:
