@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from linkwind import aero
 from linkwind.cli import app
 from linkwind.cli.force_fmu import load_with
-from linkwind.errors import InputError
+from linkwind.errors import InputError, SimulationError
 from linkwind.fmi.export import export
 from linkwind.log.reader import open_log
 from linkwind.runs.run import run
@@ -53,6 +53,21 @@ def test_the_plate_as_fmu_gives_the_native_trajectory(tmp_path, native, fmi, int
     assert logged.sha256 == hashlib.sha256(files[fmi].read_bytes()).hexdigest()
     assert logged.variables["link2.v[1]"].quantity == "link2.velocity.x"
     assert str(files[fmi].parent) not in open_log(outcome.log).scenario_json
+
+
+def test_a_stiff_drag_flies_with_the_derivatives_of_the_fmu(tmp_path):
+    """Drag times step over mass is 50: without derivatives the coupling is unstable at any order."""
+    code = DRAG.code.replace("-0.5", "-1e5")
+    attributes = f'{DRAG.attributes} canGetAndSetFMUstate="true" providesDirectionalDerivative="true"'
+    file = fmu(tmp_path, Foreign(DRAG.variables, code=code, attributes=attributes), "stiff")
+    overrides = ["time.end=0.1", "bus.transport=inprocess", "coupling.order=1"]
+    scenario, named, _ = load_with("two_link", overrides, [str(file)])
+    assert fly(scenario, tmp_path / "with", named).result.force_max_N < 1e4
+    scenario, named, _ = load_with(
+        "two_link", [*overrides, "providers.aero.fmu.derivatives=false"], [str(file)]
+    )
+    with pytest.raises(SimulationError, match="overflow"):
+        fly(scenario, tmp_path / "without", named)
 
 
 def test_a_crash_ends_the_run_with_one_error(tmp_path):

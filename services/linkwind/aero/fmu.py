@@ -13,6 +13,7 @@ from linkwind.aero.base import Capabilities, body_indices, item
 from linkwind.errors import InputError, ProtocolError, SimulationError
 from linkwind.fmi.host import description, listing, mapping
 from linkwind.fmi.host.derivatives import Derivatives
+from linkwind.fmi.host.facts import Description
 from linkwind.fmi.host.instances import Instances
 from linkwind.fmi.host.links import Mapping, elements
 from linkwind.fmi.host.planning import differentiates, interface, own_step_ns, stepping
@@ -55,7 +56,7 @@ def settle(file: Path, scenario: Scenario, provider: Provider) -> tuple[Provider
     return settled, _table(fmu, found, scenario, provider)
 
 
-def _read(file: Path, settings: FmuModel) -> description.Description:
+def _read(file: Path, settings: FmuModel) -> Description:
     fmu = description.read(file, settings.structural)
     if settings.sha256 not in (None, fmu.sha256):
         raise InputError(
@@ -65,7 +66,7 @@ def _read(file: Path, settings: FmuModel) -> description.Description:
     return fmu
 
 
-def _table(fmu: description.Description, found: Mapping, scenario: Scenario, provider: Provider) -> str:
+def _table(fmu: Description, found: Mapping, scenario: Scenario, provider: Provider) -> str:
     how = stepping(fmu, provider.fmu, scenario.coupling.step_ns)
     remarks = "".join(f"\nnote: {remark}" for remark in fmu.remarks)
     return f"{listing.text(fmu, found)}\n{how}{remarks}"

@@ -2,23 +2,24 @@
 
 ==================  ================================================================================
 ``archive``         the zip file, checked before use
-``description``     what the FMU says about itself
+``facts``           what the FMU says about itself, ``description`` reads it
 ``quantities``      what a host of forces can give and take, and the units of it
 ``names``           what a variable's name tells about it
 ``entries``         what an entry of the scenario's table says
 ``links``           what a mapping is made of
 ``mapping``         which variable is which quantity of which body: names and the scenario's table
+``checks``          what must hold of it
 ``listing``         the mapping as a table to read, and as the beginning of one to write
 ``transfer``        motion → inputs, outputs → wrench
 ``response``        directional derivatives → the matrix G, ``derivatives`` checks these
 ``planning``        from abilities and settings to a plan
 ``plan``            what a worker has to know
 ``library``         FMPy's classes: every call marked and checked
-``remote``          the library in another process, ``wine`` for libraries of Windows
+``remote``          the library in another process, called by ``message``; ``wine`` for those of Windows
 ``binding``         one instance, FMI 2 and 3 alike
 ``cosimulation``    stepping
 ``modelexchange``   integrating
-``runner``          the instances of one FMU
+``runner``          the instances of one FMU, ``saved`` their states
 ``following``       the worker on the processor of its host
 ``channel``         the messages between host and worker
 ``worker``          the process with the runner, ``process`` the host's end of it, ``inprocess`` without one

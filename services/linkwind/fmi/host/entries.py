@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from linkwind.fmi.host.description import Variable
+from linkwind.fmi.host.facts import Variable
 from linkwind.fmi.host.names import Reading, likeness
 from linkwind.fmi.host.quantities import INPUTS, OUTPUTS, exponents, to_si
 from linkwind.scenario.providers import FmuVariable

@@ -15,7 +15,7 @@ import numpy as np
 from linkwind.errors import InputError, SimulationError
 from linkwind.fmi.host import wine
 from linkwind.fmi.host.archive import Archive
-from linkwind.fmi.host.description import Description
+from linkwind.fmi.host.facts import Description
 from linkwind.fmi.host.links import Mapping
 from linkwind.fmi.host.plan import Plan
 from linkwind.fmi.host.planning import interface, plan

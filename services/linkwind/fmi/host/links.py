@@ -6,7 +6,7 @@ import itertools
 from dataclasses import dataclass
 from typing import Literal
 
-from linkwind.fmi.host.description import Variable
+from linkwind.fmi.host.facts import Variable
 
 Vector3 = tuple[float, float, float]
 _OF_TWIST = ("velocity", "relative_velocity", "angular_velocity", "acceleration", "angular_acceleration")

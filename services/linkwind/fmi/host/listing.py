@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import groupby
 
-from linkwind.fmi.host.description import Description
+from linkwind.fmi.host.facts import Description
 from linkwind.fmi.host.links import Link, Mapping
 from linkwind.fmi.host.quantities import INPUTS, OUTPUTS
 from linkwind.scenario.providers import FmuModel, FmuVariable

@@ -12,8 +12,9 @@ from difflib import get_close_matches
 from typing import Literal
 
 from linkwind.errors import InputError
-from linkwind.fmi.host.description import Description, Unit, Variable
-from linkwind.fmi.host.entries import affine, candidates, read_entry
+from linkwind.fmi.host import checks
+from linkwind.fmi.host.entries import affine, read_entry
+from linkwind.fmi.host.facts import Description, Unit, Variable
 from linkwind.fmi.host.links import Link, Mapping, elements
 from linkwind.fmi.host.names import Reading, read
 from linkwind.fmi.host.quantities import INPUTS, OUTPUTS, exponents, known, to_si, unit_names
@@ -72,10 +73,14 @@ class _Resolver:
         per_body = self._per_body([*inputs.links, *outputs.links])
         sides = [self._bodies_of(side, per_body) for side in (inputs, outputs)]
         for variable, element in inputs.left:
-            self._unmapped(variable, element)
-        self._twice(sides[1])
+            self._problem(*checks.unmapped(variable, element))
+        for problem in checks.twice(sides[1]):
+            self._problem(*problem)
         if not self.problems:
-            self._complete(sides[1], per_body, [element for _, element in outputs.left])
+            bodies = self._bodies[:1] if per_body else self._bodies
+            ignored = [element for _, element in outputs.left]
+            for problem in checks.complete(sides[1], bodies, ignored, several=not per_body):
+                self._problem(*problem)
         return Mapping(
             per_body,
             self._bodies,
@@ -219,52 +224,6 @@ class _Resolver:
                 )
             links.append(replace(link, body=max(link.body, 0)))
         return links
-
-    # --- what must hold -------------------------------------------------------------------------------
-
-    def _unmapped(self, variable: Variable, element: str) -> None:
-        kind = variable.type if not variable.unit else f"{variable.type} [{variable.unit.name}]"
-        start = "a value in fmu.start"
-        if not variable.real:
-            expected = f"{start}, because it is no Float64"
-            self._problem(
-                f"input {element}", expected, f"none, for a {kind}", f'Write start."{variable.name}" = …'
-            )
-            return
-        near = candidates(variable, element)
-        self._problem(
-            f"input {element}",
-            "a name that tells what it is, an entry in fmu.variables, or " + start,
-            f"none of them, for a {kind}",
-            f'Nearest: {", ".join(near)}. Write "{element}" = "{near[0]}" under fmu.variables.',
-        )
-
-    def _twice(self, outputs: list[Link]) -> None:
-        first: dict[tuple[str, int, int], Link] = {}
-        for link in outputs:
-            other = first.setdefault(link.target, link)
-            if other is not link:
-                label = OUTPUTS[link.quantity].label(link.component)
-                self._problem(
-                    f"output {link.element}",
-                    "a quantity of its own",
-                    f"{link.quantity}{label} of the same body as {other.element}",
-                    f'Write "{link.element}" = "none" under fmu.variables, or what it is.',
-                )
-
-    def _complete(self, outputs: list[Link], per_body: bool, ignored: list[str]) -> None:
-        """Check that every body gets a force or a torque."""
-        acted = {link.body for link in outputs if link.quantity in ("force", "torque")}
-        for index, name in enumerate(self._bodies[:1] if per_body else self._bodies):
-            if index not in acted:
-                has = f"none (outputs without a meaning: {', '.join(ignored[:8]) or 'none'})"
-                what = "an output with a force or a torque" + ("" if per_body else f" on {name}")
-                self._problem(
-                    "outputs",
-                    what,
-                    has,
-                    "Map one under fmu.variables, or leave the body to another provider.",
-                )
 
 
 def _moves(quantity: str) -> bool:

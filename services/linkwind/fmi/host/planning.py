@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from linkwind.errors import InputError
-from linkwind.fmi.host.description import Abilities, Description, Interface, Variable
+from linkwind.fmi.host.facts import Abilities, Description, Interface, Variable
 from linkwind.fmi.host.links import Mapping
 from linkwind.fmi.host.plan import Plan, Setting
 from linkwind.scenario.providers import FmuModel

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from linkwind.fmi.host.description import Unit
+from linkwind.fmi.host.facts import Unit
 
 Exponents = tuple[int, int, int, int]  # of kg, m, s and everything else; angles count as numbers
 

@@ -11,22 +11,15 @@ import ctypes
 import os
 import resource
 import signal
-import struct
 import subprocess
 from collections.abc import Callable, Sequence
-from ctypes import c_char_p, c_double, c_int
+from ctypes import c_int
 from pathlib import Path
 from typing import Any
 
-from fmpy.fmi2 import fmi2CallbackFunctions
-from fmpy.fmi3 import fmi3IntermediateUpdateCallback, fmi3LogMessageCallback
-
 from linkwind.fmi.host.library import CallError
+from linkwind.fmi.host.message import HEAD, Message
 
-_HEAD = struct.Struct("<QQII14Q")
-_ARGUMENTS = 14
-_FIRST_ARGUMENT = 24  # B from the beginning of a message
-_MASK = (1 << 64) - 1
 _ALTERED_SEARCH_PATH = 8  # look for the DLLs that a DLL needs in its own folder
 _EXCEPTIONS = {
     0xC0000005: "access violation",
@@ -37,7 +30,6 @@ _EXCEPTIONS = {
     0x80000003: "breakpoint",
     0xE06D7363: "C++ exception that nobody caught",
 }
-_CALLBACKS = (fmi3IntermediateUpdateCallback,)  # that nobody here answers
 _PR_SET_PDEATHSIG = 1
 
 
@@ -69,7 +61,7 @@ class Connection:
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._to, self._from = self._process.stdin.fileno(), self._process.stdout.fileno()
-        hello = _HEAD.unpack(self._receive("its start")[0])
+        hello = HEAD.unpack(self._receive("its start")[0])
         numbers: list[int] = list(hello[4:9])
         self.load, self.find, self.last_error, self.callbacks2, self.log3 = numbers
 
@@ -86,7 +78,7 @@ class Connection:
         Raises:
             CallError: the process ended in it.
         """
-        message = _Message(self)
+        message = Message(self.callbacks2, self.log3)
         values = [
             message.take(argument, types[i] if i < len(types) else None, i)
             for i, argument in enumerate(arguments)
@@ -94,7 +86,7 @@ class Connection:
         self._send(message.pack(function, values))
         head, rest = self._receive(name)
         message.put_back(rest)
-        return int(_HEAD.unpack(head)[1])
+        return int(HEAD.unpack(head)[1])
 
     def _send(self, data: bytes) -> None:
         with contextlib.suppress(BrokenPipeError):  # the missing answer tells
@@ -102,12 +94,12 @@ class Connection:
                 data = data[os.write(self._to, data) :]
 
     def _receive(self, name: str) -> tuple[bytes, bytes]:
-        head = self._read(_HEAD.size)
-        if len(head) < _HEAD.size:
+        head = self._read(HEAD.size)
+        if len(head) < HEAD.size:
             status = self._process.wait()
             how = f"exit status {status}" if status >= 0 else f"signal {signal.Signals(-status).name}"
             raise CallError(f"its Windows process died in {name}: {how}")
-        function, result, size, *_ = _HEAD.unpack(head)
+        function, result, size, *_ = HEAD.unpack(head)
         if not function:
             what = _EXCEPTIONS.get(result, "see the list of NTSTATUS values")
             raise CallError(f"its Windows process died in {name}: exception 0x{result:08X}, {what}")
@@ -118,90 +110,6 @@ class Connection:
         while len(data) < size and (block := os.read(self._from, size - len(data))):
             data += block
         return data
-
-
-class _Message:
-    """The arguments of one call."""
-
-    def __init__(self, connection: Connection) -> None:
-        self._connection = connection
-        self._data = bytearray()
-        self._pointers: list[
-            tuple[bool, int]
-        ] = []  # places of pointers: in the data, or an argument's number
-        self._back: list[tuple[Any, int]] = []  # what comes back, and from where in the data
-
-    def take(self, argument: Any, expected: Any, number: int) -> int | None:
-        """Return an argument as 64 bits; for a pointer, the place in the data that it points to."""
-        if expected is c_double and not isinstance(argument, ctypes._SimpleCData):
-            argument = c_double(argument)
-        if isinstance(argument, int):  # bool is one
-            return argument & _MASK
-        if argument is None:
-            return 0
-        if isinstance(argument, fmi3LogMessageCallback):
-            return self._connection.log3
-        if isinstance(argument, _CALLBACKS):
-            return 0
-        if isinstance(argument, c_double):
-            return int(struct.unpack("<Q", struct.pack("<d", argument.value))[0])
-        if isinstance(argument, ctypes._SimpleCData):
-            return int(argument.value or 0) & _MASK
-        return self._point(argument, number)
-
-    def _point(self, argument: Any, number: int) -> int:
-        if isinstance(argument, bytes):
-            return self._put(argument + b"\0", number)
-        argument = getattr(argument, "_obj", argument)  # of byref
-        if isinstance(argument, ctypes._Pointer):  # of cast
-            kept = (argument._objects or {}).values()
-            argument = next(each for each in kept if isinstance(each, ctypes.Array))
-        if isinstance(argument, fmi2CallbackFunctions):
-            return self._connection.callbacks2
-        if isinstance(argument, ctypes.Array) and argument._type_ is c_char_p:
-            return self._strings(argument, number)
-        place = self._put(bytes(argument), number)
-        self._back.append((argument, place))
-        return place
-
-    def _put(self, data: bytes, number: int | None = None) -> int:
-        place = len(self._data)
-        self._data += data + bytes(-len(data) % 8)
-        if number is not None:
-            self._pointers.append((False, number))
-        return place
-
-    def _strings(self, strings: Any, number: int) -> int:
-        place = self._put(bytes(8 * len(strings)), number)
-        for i, text in enumerate(strings):
-            if text is not None:
-                struct.pack_into("<Q", self._data, place + 8 * i, self._put(text + b"\0"))
-                self._pointers.append((True, place + 8 * i))
-        return place
-
-    def pack(self, function: int, values: Sequence[Any]) -> bytes:
-        """Return the message."""
-        count = len(self._pointers)
-        self._begin = 4 * count + (4 * count) % 8  # of the data, after the places of the pointers
-        begin = _HEAD.size + self._begin
-        numbers = [*values, *[0] * (_ARGUMENTS - len(values))]
-        places = []
-        for in_data, at in self._pointers:
-            if in_data:
-                places.append(begin + at)
-                (target,) = struct.unpack_from("<Q", self._data, at)
-                struct.pack_into("<Q", self._data, at, begin + target)
-            else:
-                places.append(_FIRST_ARGUMENT + 8 * at)
-                numbers[at] += begin
-        head = _HEAD.pack(function, 0, self._begin + len(self._data), count, *numbers)
-        return head + struct.pack(f"<{count}I", *places).ljust(self._begin, b"\0") + self._data
-
-    def put_back(self, answer: bytes) -> None:
-        """Write what came back to where the arguments pointed."""
-        for target, place in self._back:
-            size = ctypes.sizeof(target)
-            ctypes.memmove(ctypes.addressof(target), answer[self._begin + place :][:size], size)
 
 
 class RemoteFunction:

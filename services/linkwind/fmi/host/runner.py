@@ -15,6 +15,7 @@ from linkwind.fmi.host.cosimulation import CoSimulation
 from linkwind.fmi.host.library import CallError, Log
 from linkwind.fmi.host.modelexchange import ModelExchange
 from linkwind.fmi.host.plan import Marker, Plan
+from linkwind.fmi.host.saved import Saved
 
 _STEPPERS: dict[str, Callable[[Binding, Plan], CoSimulation | ModelExchange]] = {
     "cs": CoSimulation,
@@ -22,7 +23,6 @@ _STEPPERS: dict[str, Callable[[Binding, Plan], CoSimulation | ModelExchange]] = 
 }
 _HEAD = struct.Struct("<8sBqqI")  # magic, mode, start and present time [ns], instances
 _MAGIC = b"LWHOST1\0"
-_KEPT = 4  # states that stay in the process where they cannot be bytes
 
 
 class Mode(Enum):
@@ -49,8 +49,7 @@ class Runner:
             Binding(plan, number, memory, self._mark, log, library) for number in range(len(plan.instances))
         ]
         self._steppers = [_STEPPERS[plan.interface](binding, plan) for binding in self._bindings]
-        self._kept: dict[int, list[Any]] = {}
-        self._next_kept = 0
+        self._saved = Saved(self._bindings, as_bytes=plan.state == "bytes")
         self._before: tuple[int, list[tuple[Any, list[float]]]] | None = None  # time, states before a step
         self._now = self._start = 0
         self._configure()
@@ -178,25 +177,10 @@ class Runner:
         self._begin()  # so that the state is always one of step mode
         outputs = bytes(self._memory[self._outputs_at : self._derivatives_at])
         parts = [_HEAD.pack(_MAGIC, 1, self._start, self._now, len(self._bindings)), outputs]
-        for stepper, state in zip(self._steppers, self._states(), strict=True):
+        for stepper, state in zip(self._steppers, self._saved.save(), strict=True):
             memory = stepper.memory()
             parts += [struct.pack(f"<II{len(memory)}d", len(memory), len(state), *memory), state]
         return b"".join(parts)
-
-    def _states(self) -> list[bytes]:
-        """Return each instance's state as bytes, or as the number under which it is kept."""
-        handles = [binding.keep() for binding in self._bindings]
-        if self._plan.state == "bytes":
-            blobs = []
-            for binding, handle in zip(self._bindings, handles, strict=True):
-                blobs.append(binding.to_bytes(handle))
-                binding.drop(handle)
-            return blobs
-        self._next_kept += 1
-        self._kept[self._next_kept] = handles
-        for binding, handle in zip(self._bindings, self._kept.pop(self._next_kept - _KEPT, []), strict=False):
-            binding.drop(handle)
-        return [struct.pack("<q", self._next_kept)] * len(handles)
 
     def restore(self, blob: bytes) -> None:
         """Take back what ``save`` returned.
@@ -219,8 +203,8 @@ class Runner:
         if self._mode is Mode.INSTANTIATED:
             self._initialise(start)
         self._begin()
-        for i, binding in enumerate(self._bindings):
-            self._put(binding, i, states[i])
+        for i in range(len(self._bindings)):
+            self._saved.put(i, states[i])
             self._steppers[i].remember(memories[i])
             self._steppers[i].after_restore()
         self._memory[self._outputs_at : self._derivatives_at] = blob[_HEAD.size : _HEAD.size + held]
@@ -239,17 +223,6 @@ class Runner:
             raise CallError("the checkpoint is cut off") from None
         return memories, states
 
-    def _put(self, binding: Binding, number: int, state: bytes) -> None:
-        if self._plan.state == "bytes":
-            handle = binding.from_bytes(state)
-            binding.go_back(handle)
-            binding.drop(handle)
-            return
-        key = struct.unpack("<q", state)[0] if len(state) == 8 else -1
-        if key not in self._kept:
-            raise CallError("the state is no longer kept: this FMU cannot write its state as bytes")
-        binding.go_back(self._kept[key][number])
-
     def _fresh(self) -> None:
         """Go back to before the first evaluation."""
         if self._mode is Mode.STEPPING:
@@ -260,8 +233,6 @@ class Runner:
     def close(self) -> None:
         """Terminate and free every instance."""
         self._forget()
-        for handles in self._kept.values():
-            for binding, handle in zip(self._bindings, handles, strict=True):
-                binding.drop(handle)
+        self._saved.drop()
         for binding in self._bindings:
             binding.free(terminate=self._mode is Mode.STEPPING)
