@@ -87,15 +87,14 @@ def test_order_of_exchange(pair: tuple[DynamicsSession, ProviderSession, FakeMod
     ]
 
 
-def test_iteration_goes_back_to_the_committed_state(
+def test_iteration_evaluates_again_without_a_commit(
     pair: tuple[DynamicsSession, ProviderSession, FakeModel],
 ) -> None:
     d, p, model = pair
     exchange(d, p, 0)
     exchange(d, p, 1)
-    saved = model.blobs[-1]
     exchange(d, p, 1, iteration=1)
-    assert model.calls[-2:] == [("restore", saved), ("evaluate", 0.001)]
+    assert model.calls[-3:] == [("commit", 0.0), ("evaluate", 0.001), ("evaluate", 0.001)]
 
 
 def test_iteration_without_rollback_is_refused() -> None:
@@ -343,13 +342,3 @@ def test_provider_that_died_before_ready_can_be_replaced() -> None:
     first.build()
     with pytest.raises(RefusedError, match="Ready without Hello"):
         first.started(d.control(first.ready()))
-
-
-def test_every_commit_is_a_place_to_go_back_to(
-    pair: tuple[DynamicsSession, ProviderSession, FakeModel],
-) -> None:
-    d, p, model = pair
-    before = len(model.blobs)
-    for step in range(4):
-        exchange(d, p, step)
-    assert len(model.blobs) == before + 3

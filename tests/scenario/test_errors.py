@@ -30,7 +30,8 @@ WRONG = [
     ("mass = 2.0", "mas = 2.0",
      f'bodies[0].mas: expected a key among {BODY_KEYS}; got "mas". Use "mass".'),
     ("[aero.plate]", "[aero.plat]",
-     'aero.plat: expected a key among name, model, bodies, plate, field, fmu; got "plat". Use "plate".'),
+     'aero.plat: expected a key among name, model, bodies, plate, field, flow, fmu; '
+     'got "plat". Use "plate".'),
     ("[dynamics]", "[dynamic]",
      f'dynamic: expected a key among {TOP_KEYS}; got "dynamic". Use "dynamics".'),
     ("order = 3", "order = 3\nqqq = 1",
@@ -49,7 +50,7 @@ WRONG = [
      'dynamics.integrator: expected one of euler, semi_implicit_euler, rk4, dopri5; got "ode45". '
      'Use "dopri5".'),
     ('model = "plate"', 'model = "lbm"',
-     'aero.model: expected one of none, field, plate, fmu; got "lbm". Use one of these.'),
+     'aero.model: expected one of none, field, plate, flow, fmu; got "lbm". Use one of these.'),
     # types
     ("mass = 2.0", 'mass = "2 kg"',
      'bodies[0].mass: expected a number [kg]; got "2 kg". Write the number alone, without quotes and unit.'),
@@ -133,7 +134,7 @@ WRONG = [
     ("[aero.plate]", '[aero.field.link3]\nfx = "1"\n[aero.plate]',
      'aero.field.link3: expected one of its bodies link1, link2; got "link3". Use "link2".'),
     ("[aero]", '[[providers]]\nname = "cfd"\nmodel = "plats"\n[aero]',
-     'providers[0].model: expected one of none, field, plate, fmu; got "plats". Use "plate".'),
+     'providers[0].model: expected one of none, field, plate, flow, fmu; got "plats". Use "plate".'),
     # topology
     ('child = "link2"', 'child = "link1"',
      'joints[0].parent: expected another body than the child; got "link1". '
@@ -173,7 +174,7 @@ def test_zero_mass_needs_a_model_that_adds_inertia():
         loads(text, "x", ["aero.model=none"])
     assert str(error.value) == (
         "x: bodies[0].mass: expected a number above 0 [kg], because no provider adds inertia to this body; "
-        "got 0.0. Give it a mass, or the model plate."
+        "got 0.0. Give it a mass, or the model plate or flow."
     )
 
 

@@ -129,7 +129,13 @@ def test_a_path_and_a_name_load_the_same(tmp_path):
 
 
 def test_builtin_names():
-    assert builtin_names() == ["two_link", "two_link_field", "two_link_free", "two_link_gust"]
+    assert builtin_names() == [
+        "two_link",
+        "two_link_field",
+        "two_link_flow",
+        "two_link_free",
+        "two_link_gust",
+    ]
 
 
 def test_the_template_loads_and_is_valid():

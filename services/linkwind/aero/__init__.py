@@ -14,6 +14,7 @@ from pathlib import Path
 
 from linkwind.aero.base import Capabilities, ForceModel, item, table
 from linkwind.aero.field import ForceField
+from linkwind.aero.flow import Flow
 from linkwind.aero.none import Vacuum
 from linkwind.aero.plate import Plate
 from linkwind.errors import InputError
@@ -25,6 +26,7 @@ MODELS: dict[str, Callable[[Scenario, Provider], ForceModel]] = {
     "none": Vacuum,
     "field": ForceField,
     "plate": Plate,
+    "flow": Flow,
 }
 
 

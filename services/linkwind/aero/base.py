@@ -16,7 +16,7 @@ class Capabilities:
     Attributes:
         kind: ``point``: the wrench at the time asked for; ``mean``: the mean over the step that ends
             there, its impulse kept.
-        rollback: whether save and restore bring back every bit of memory.
+        rollback: whether a step can be evaluated again, and save and restore bring back every bit of memory.
         added_inertia: whether the wrench comes with ``A``, the part proportional to acceleration.
         response_size: numbers of ``G``, the derivative by the twist at the end of the step, in the message:
             0 without it, 36n for a matrix each body, (6n)² where the model couples the bodies.
@@ -52,6 +52,9 @@ class ForceModel(Protocol):
 
     def evaluate(self, t: float, motion: Motion, wrench: Wrench) -> None:
         """Fill the wrench for a trial state at time t [s].
+
+        Called again without a commit in between, for another coupling iteration, it starts again from what
+        was committed.
 
         Raises:
             SimulationError: a force is not finite.

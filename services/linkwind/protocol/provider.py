@@ -124,7 +124,6 @@ class ProviderSession:
             response_size=can.response_size,
             diagnostics=can.diagnostics,
         )
-        self._checkpoint = self._model.save() if can.rollback else None
 
     def ready(self) -> bytes:
         """Return the message that says that motion can come."""
@@ -199,18 +198,15 @@ class ProviderSession:
         return taken
 
     def _advance(self, step: int, iteration: int) -> None:
-        """Commit the accepted state when the step is new, go back to it for another iteration."""
+        """Commit the accepted state when the step is new; another iteration evaluates from there again."""
         motion = self._motion
         last_step, last_iteration = self.at
         if step == last_step + 1 and iteration == 0:
             if step:
                 self._model.commit((motion.time_ns - self._step_ns) / 1e9, motion.accepted)
-                if self._checkpoint is not None:
-                    self._checkpoint = self._model.save()
         elif step == last_step and iteration == last_iteration + 1:
-            if self._checkpoint is None:
+            if not self._model.capabilities.rollback:
                 raise ProtocolError(f'"{self.name}": iteration {iteration} asked, but it cannot roll back')
-            self._model.restore(self._checkpoint)
         else:
             raise ProtocolError(
                 f'"{self.name}": expected step {last_step + 1} iteration 0; got step {step} '

@@ -136,6 +136,36 @@ def _provider_model(scenario: Scenario, provider: Provider, path: Path) -> Itera
                 advice = f'{"Write" if body.shape else "Add"} shape = {{ type = "plate", length = … }}.'
                 yield Problem(("bodies", index, "shape"), expected, got, advice)
 
+    if provider.model == "flow":
+        yield from _flow(scenario, provider, path)
+
+
+def _flow(scenario: Scenario, provider: Provider, path: Path) -> Iterator[Problem]:
+    """What a two-dimensional flow asks for: planar bodies of one span with shapes, in a uniform wind."""
+    acted = [(i, body) for i, body in enumerate(scenario.bodies) if body.name in provider.bodies]
+    spans = [(i, body.shape.span) for i, body in acted if body.shape is not None]
+    for index, body in acted:
+        if body.shape is None:
+            expected = f'a shape, which the model of provider "{provider.name}" needs'
+            advice = 'Add one, such as shape = { type = "plate", length = … }.'
+            yield Problem(("bodies", index, "shape"), expected, "nothing", advice)
+        if not body.planar:
+            expected = "one number: the model flow is two-dimensional"
+            yield Problem(("bodies", index, "inertia"), expected, show(body.inertia), "Give it about z.")
+    for index, span in spans:
+        if span != spans[0][1]:
+            expected = f"the span of the others, {spans[0][1]!r} m: the model flow is two-dimensional"
+            yield Problem(("bodies", index, "shape", "span"), expected, show(span), "Give all the same.")
+    if scenario.environment.gusts:
+        expected = "none: the model flow has a uniform wind"
+        got = f"{len(scenario.environment.gusts)} of them"
+        yield Problem(("environment", "gusts"), expected, got, "Remove them, or use the model plate.")
+    if any(component for component in scenario.environment.wind[2:]):
+        expected = "no component along z: the model flow is two-dimensional"
+        yield Problem(("environment", "wind"), expected, show(list(scenario.environment.wind)), "Set z to 0.")
+    if scenario.environment.density == 0.0:
+        yield Problem(("environment", "density"), "a number above 0 for the model flow", "0", "Give it one.")
+
 
 def _first(names: Sequence[str]) -> str:
     return names[0] if names else "body"
@@ -143,10 +173,10 @@ def _first(names: Sequence[str]) -> str:
 
 def _masses(scenario: Scenario) -> Iterator[Problem]:
     """A body without mass moves only if a model adds inertia to it."""
-    adding = [entry for entry in scenario.providers if entry.model in ("plate", "fmu")]
+    adding = [entry for entry in scenario.providers if entry.model in ("plate", "flow", "fmu")]
     carried = {name for entry in adding for name in entry.bodies}
     for index, body in enumerate(scenario.bodies):
         if body.mass == 0.0 and body.name not in carried:
             expected = "a number above 0 [kg], because no provider adds inertia to this body"
-            advice = "Give it a mass, or the model plate."
+            advice = "Give it a mass, or the model plate or flow."
             yield Problem(("bodies", index, "mass"), expected, show(body.mass), advice)

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 from linkwind.scenario.problems import ProblemError
 from linkwind.scenario.quantities import Name, Section, Vector, quantity
 
-AeroModel = Literal["none", "field", "plate", "fmu"]
+AeroModel = Literal["none", "field", "plate", "flow", "fmu"]
 PlateCoefficients = Literal["ristroph", "andersen"]
 
 
@@ -68,6 +68,29 @@ class PlateModel(Section):
     coefficients: PlateCoefficients = Field(
         default="ristroph",
         description="Coefficients: ristroph (Li et al. 2022), andersen (Andersen, Pesavento & Wang 2005)",
+    )
+
+
+class FlowModel(Section):
+    """Settings of the two-dimensional flow around the bodies, on a lattice."""
+
+    cells: float = quantity("Cells of the lattice along the longest body", "1", 48.0, ge=8.0, le=2000.0)
+    window: tuple[float, float] | None = Field(
+        default=None,
+        strict=False,
+        description="Width and height of the window that goes with the mechanism [m]; default: 10 and 8 "
+        "lengths of its longest body more than the mechanism",
+        json_schema_extra={"unit": "m"},
+    )
+    start_time: float | None = quantity(
+        "Time in which the wind comes up; default: what it takes along the longest body, 0 in still air",
+        "s",
+        None,
+        ge=0.0,
+    )
+    frames: int = Field(default=48, ge=0, le=10000, description="Pictures of the flow in the log of a run")
+    threads: int = Field(
+        default=1, ge=1, le=256, description="Threads that share the work; no bit depends on it"
     )
 
 
@@ -170,4 +193,5 @@ class Provider(Section):
     field: dict[str, FieldExpressions] = Field(
         default={}, description="The model field: a table for each body, by its name"
     )
+    flow: FlowModel = Field(default=FlowModel(), description="Settings of the model flow")
     fmu: FmuModel = Field(default=FmuModel(), description="Settings of the model fmu")

@@ -43,6 +43,7 @@ class Environment(Section):
 
     gravity: Vector = quantity("Acceleration of gravity, in the world", "m/s²", (0.0, -9.81, 0.0))
     density: float = quantity("Density of the fluid", "kg/m³", 1.225, ge=0.0)
+    viscosity: float = quantity("Kinematic viscosity of the fluid", "m²/s", 1.5e-5, gt=0.0)
     wind: Vector = quantity("Velocity of the undisturbed fluid, in the world", "m/s", ZERO)
     gusts: tuple[Gust, ...] = Field(
         default=(), strict=False, description="Waves that travel through the wind"

@@ -1,0 +1,301 @@
+"""The force model: a lattice, the bodies in it, and when it steps.
+
+With one lattice step in a communication step, ``evaluate`` changes nothing: it asks the markers which
+forces would give the fluid the velocity of the trial state, and how they change with it (``G``). ``commit``
+steps the fluid with the velocity that was accepted; both sides have then exchanged the same impulse. With
+several lattice steps in a communication step there is no ``G``: ``evaluate`` steps the fluid along the way
+to the trial state, and ``commit`` keeps that.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+
+import numpy as np
+
+from linkwind.aero.base import Capabilities, body_indices, item
+from linkwind.aero.flow import grid as grids
+from linkwind.aero.flow.interior import Interior
+from linkwind.aero.flow.motion import Planar, between, planar
+from linkwind.aero.flow.outline import markers
+from linkwind.aero.flow.window import Window
+from linkwind.errors import ProtocolError, SimulationError
+from linkwind.frames import FlowFrame
+from linkwind.native.boundary import Boundary, Placement
+from linkwind.scenario import Provider, Scenario
+from linkwind.spatial import Array, Motion, Wrench
+
+_log = logging.getLogger("linkwind")
+
+
+class Flow:
+    """Forces of a two-dimensional, unsteady, incompressible flow around the bodies.
+
+    The wrench [N, N·m] is the mean over a communication step, in W at the centres of mass; per metre of
+    span times the span. It comes with ``G`` where a communication step is one lattice step.
+
+    Diagnostics: ``mach``, the fastest of wind and bodies over the lattice's speed of sound (errors of
+    compressibility grow with its square); ``leak``, the largest flow through an outline over the same
+    speed; ``cell_reynolds``, that speed times the cell over the viscosity (above about 10 boundary layers
+    are not resolved); ``substeps``, lattice steps in a communication step.
+    """
+
+    def __init__(self, scenario: Scenario, provider: Provider) -> None:
+        """Plan the lattice; it is filled when the first motion comes.
+
+        Raises:
+            ScenarioError: too coarse, or the communication step too long.
+        """
+        self._scenario, self._provider = scenario, provider
+        self._grid = grids.plan(scenario, provider)
+        acted = grids.bodies(scenario, provider)
+        self._acted = acted
+        self._bodies = np.array(body_indices(scenario, provider))
+        self._boundary = Boundary(len(acted), markers(acted, list(scenario.joints), self._grid.cell))
+        self._interior = Interior(acted, self._grid.density)
+        self._reach = np.array([0.5 * body.shape.reference_length for body in acted if body.shape])
+        self._every = max(1, round(scenario.steps / provider.flow.frames)) if provider.flow.frames else 0
+        self._h = scenario.coupling.step_ns / 1e9
+        self._substeps = self._grid.substeps
+        self._fluid: Window | None = None
+        self._step, self._shown, self._leak = 0, -1, 0.0
+        self._ahead = False  # whether the fluid has gone to the trial state, by several lattice steps
+        self._kept = b""  # the fluid before that
+        self.capabilities = Capabilities(
+            kind="mean",
+            response_size=(6 * len(acted)) ** 2 if self._substeps == 1 else 0,
+            own_step_ns=0 if self._substeps == 1 else round(self._grid.step * 1e9),
+            diagnostics=("mach", "leak", "cell_reynolds", "substeps"),
+        )
+
+    # ---- the contract ----
+
+    def commit(self, t: float, motion: Motion) -> None:
+        """Step the fluid to time t [s] with the accepted motion, or keep where it has gone to already."""
+        accepted = planar(motion, self._bodies)
+        step = round(t / self._h)
+        if self._fluid is None:
+            self._begin(accepted)
+        elif step > self._step and not self._ahead:
+            self._leak = self._fluid.go(self._boundary, self._trial.pose, self._wall(t, accepted.twist))
+        self._step, self._ahead = step, False
+        self._keep_slow(accepted)
+        self._accepted = accepted
+
+    def evaluate(self, t: float, motion: Motion, wrench: Wrench) -> None:
+        """Write the mean wrench over the step that ends in the trial state at time t [s].
+
+        Raises:
+            ScenarioError: the window is too small or too large.
+            SimulationError: a body leaves the window or meets another, is too fast, or the fluid is unstable.
+        """
+        self._trial = planar(motion, self._bodies)
+        if self._fluid is None:
+            self._begin(self._trial)
+        elif self._ahead:
+            self._window.restore(self._kept)
+            self._ahead = False
+        if self._substeps == 1 or t == 0.0:
+            force, response = self._one_step(t)
+        else:
+            force, response = self._several_steps(t), np.zeros((3 * len(self._bodies),) * 2)
+        self._write(t, force, response, wrench)
+
+    def frame(self) -> FlowFrame | None:
+        """Return a picture of the fluid if one is due."""
+        step = self._step + self._ahead
+        if self._fluid is None or not self._every or step == self._shown or step % self._every:
+            return None
+        self._shown = step
+        density = self._scenario.environment.density
+        return self._fluid.picture(density, step, step * self._scenario.coupling.step_ns)
+
+    def save(self) -> bytes:
+        """Return the whole fluid, as it was committed, as an opaque blob; empty before the first motion."""
+        if self._fluid is None:
+            return b""
+        motions = np.hstack([*self._start, *self._accepted]).astype("<f8")
+        return motions.tobytes() + (self._kept if self._ahead else self._fluid.save())
+
+    def restore(self, blob: bytes) -> None:
+        """Take back the fluid that ``save`` returned.
+
+        Raises:
+            ProtocolError: the blob is not one of this flow.
+        """
+        self._ahead = False
+        if not blob:
+            self._fluid, self._step, self._substeps = None, 0, self._grid.substeps
+            return
+        n = len(self._bodies)
+        if len(blob) < 14 * n * 8:
+            raise ProtocolError(f"model flow: expected a checkpoint; got {len(blob)} bytes.")
+        parts = np.split(np.frombuffer(blob, "<f8", 14 * n).reshape(n, 14), [4, 7, 11], axis=1)
+        start, accepted = Planar(*parts[:2]), Planar(*parts[2:])
+        if self._fluid is None:
+            self._begin(start)
+        self._start, self._accepted = start, accepted
+        self._window.restore(blob[14 * n * 8 :])
+        self._substeps = round(self._h / self._window.step)
+
+    # ---- one step ----
+
+    @property
+    def _window(self) -> Window:
+        if self._fluid is None:
+            raise ProtocolError("model flow: expected a first motion, at t = 0; got none.")
+        return self._fluid
+
+    def _begin(self, start: Planar) -> None:
+        """Fill the window around the bodies."""
+        centres = start.pose[:, :2]
+        size = grids.window(self._scenario, self._provider, self._grid, centres)
+        self._fluid = Window(self._grid, size, centres.mean(axis=0), self._provider.flow.threads)
+        self._start = self._accepted = start
+        self._keep_slow(start)
+        self._start_time = _start_time(self._scenario, self._provider, self._grid.length)
+        _log.info(
+            '"%s": %d × %d cells of %.4g m, %.4g s a lattice step, %d in a communication step; %d markers',
+            self._provider.name, *size, self._grid.cell, self._grid.step, self._substeps,
+            len(self._boundary.markers.body),
+        )  # fmt: skip
+
+    def _wall(self, t: float, twist: Array) -> Array:
+        """Return the twists that the fluid is given: at first those of the stream, so that the start is "
+        "smooth."""
+        s = min(1.0, t / self._start_time) if self._start_time else 1.0
+        if s == 1.0:
+            return twist
+        left = 1.0 - s * s * (3.0 - 2.0 * s)
+        return twist + left * (np.array([*self._grid.wind, 0.0]) - self._start.twist)
+
+    def _place(self, t: float, at: Planar) -> None:
+        placement, marker = self._window.place(self._boundary, at.pose)
+        if placement == Placement.PLACED:
+            return
+        names = [self._acted[i].name for i in self._boundary.markers.body[marker] if i >= 0]
+        where = " and ".join(f'"{name}"' for name in names)
+        if placement == Placement.OUTSIDE:
+            raise SimulationError(
+                f"{self._item('window')}: t = {t:.6g} s: expected every body inside the window, "
+                f"{grids.FRINGE + 2} cells "
+                f"from its border; got {where} outside. Make the window larger: bodies drift apart, or "
+                f"start far "
+                "from each other."
+            )
+        raise SimulationError(
+            f"{self._item('cells')}: t = {t:.6g} s: expected outlines at least half a cell apart; got "
+            f"{where} on another. "
+            "Bodies that touch need a joint between them, or more cells."
+        )
+
+    def _one_step(self, t: float) -> tuple[Array, Array]:
+        """Return what the markers ask for: force in N and N·m, shape (n, 3), and G, shape (3n, 3n)."""
+        self._place(t, self._trial)
+        wall = self._wall(t, self._trial.twist)
+        self._boundary.evaluate(self._window.twists(wall))
+        scale = self._scale()
+        n, step = len(self._bodies), self._window.step
+        per = np.tile(np.array([1.0, 1.0, self._grid.cell]), n)
+        force = self._boundary.wrench * (scale * per[:3])
+        response = self._boundary.response * (scale / self._window.speed * np.outer(per, per))
+        if t > 0.0 and self._interior.any:
+            inertia = self._interior.inertia(self._trial.pose)
+            force += self._inside(t, wall, inertia)
+            for i in range(n):
+                response[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] -= inertia[i] / step
+        return force, response
+
+    def _several_steps(self, t: float) -> Array:
+        """Step the fluid to the trial state; return the mean force, shape (n, 3)."""
+        self._kept, self._ahead = self._window.save(), True
+        before, count = t - self._h, self._substeps
+        total, per = np.zeros((len(self._bodies), 3)), np.array([1.0, 1.0, self._grid.cell])
+        for i in range(1, count + 1):
+            now = before + self._h * i / count
+            at = between(self._accepted, self._trial, i / count, self._h)
+            self._place(now, at)
+            wall = self._wall(now, at.twist)
+            self._boundary.evaluate(self._window.twists(wall))
+            total += self._boundary.wrench
+            self._leak = self._window.go(self._boundary, at.pose, wall)
+        force = total * (self._scale() / count * per)
+        if self._interior.any:
+            inertia = self._interior.inertia(self._trial.pose)
+            force += self._inside(t, self._wall(t, self._trial.twist), inertia)
+        return force
+
+    def _inside(self, t: float, wall: Array, inertia: Array) -> Array:
+        """Return the force that the fluid inside the outlines took, shape (n, 3)."""
+        before = self._wall(t - self._h, self._accepted.twist)
+        then = self._interior.inertia(self._accepted.pose)
+        gained = (inertia * wall[:, None, :]).sum(axis=2) - (then * before[:, None, :]).sum(axis=2)
+        return np.asarray(gained / self._h)
+
+    def _scale(self) -> float:
+        """Return the force of a lattice unit [N]."""
+        return self._grid.density * self._grid.cell * self._window.speed**2
+
+    def _keep_slow(self, at: Planar) -> None:
+        """Shorten the lattice step where the bodies have become too fast for it."""
+        fastest = at.fastest(self._reach)
+        while fastest / self._window.speed > grids.MAX_SPEED:
+            if not math.isfinite(fastest) or self._substeps >= grids.MAX_SUBSTEPS:
+                raise SimulationError(
+                    f"{self._item('cells')}: expected bodies of at most {grids.MAX_SUBSTEPS} lattice steps "
+                    f"of "
+                    f"{grids.MAX_SPEED} cells in a communication step; got {fastest:.4g} m/s. Has the motion "
+                    "diverged? Try a smaller coupling.step."
+                )
+            self._shorten(fastest)
+
+    def _shorten(self, fastest: float) -> None:
+        light = [body.name for body in self._acted if body.mass < self._grid.density * self._grid.length**2]
+        if self._substeps == 1 and light:
+            limit = grids.MAX_SPEED * self._window.speed
+            raise SimulationError(
+                f"{self._scenario.source}: coupling.step: expected bodies below {grids.MAX_SPEED} cells "
+                f'a step, {limit:.4g} m/s, because "{light[0]}" is light and needs the response of a single '
+                f"lattice step; got {fastest:.4g} m/s. Use at most {0.5 * self._h:.3g} s."
+            )
+        self._window.halve(self._grid.viscosity)
+        self._substeps *= 2
+        _log.info(
+            '"%s": a body goes %.4g m/s: %d lattice steps in a communication step from now on',
+            self._provider.name, fastest, self._substeps,
+        )  # fmt: skip
+
+    def _write(self, t: float, force: Array, response: Array, wrench: Wrench) -> None:
+        if not np.isfinite(force).all():
+            raise SimulationError(
+                f"{self._item('cells')}: expected a finite force at t = {t:.6g} s; got {force.tolist()}: "
+                f"the fluid "
+                "is unstable. Use a smaller coupling.step, more cells, or a longer start_time."
+            )
+        wrench.force.fill(0.0)
+        wrench.torque.fill(0.0)
+        wrench.force[:, :2], wrench.torque[:, 2] = force[:, :2], force[:, 2]
+        if wrench.response is not None:
+            rows = (6 * np.arange(len(self._bodies))[:, None] + np.array([0, 1, 5])).ravel()
+            wrench.response.fill(0.0)
+            wrench.response.reshape(6 * len(self._bodies), -1)[rows[:, None], rows] = response
+        if wrench.diagnostics is not None:
+            speed = max(self._trial.fastest(self._reach), math.hypot(*self._grid.wind))
+            wrench.diagnostics[:] = (
+                speed / self._window.speed * math.sqrt(3.0),
+                self._leak / speed if speed else 0.0,
+                speed * self._grid.cell / self._grid.viscosity,
+                self._substeps,
+            )
+
+    def _item(self, key: str) -> str:
+        return item(self._scenario, self._provider, "flow", key)
+
+
+def _start_time(scenario: Scenario, provider: Provider, length: float) -> float:
+    """Return the time in which the wind comes up [s]."""
+    wind = math.hypot(*scenario.environment.wind[:2])
+    if provider.flow.start_time is not None:
+        return provider.flow.start_time
+    return length / wind if wind else 0.0
