@@ -61,6 +61,7 @@ class Connection:
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._to, self._from = self._process.stdin.fileno(), self._process.stdout.fileno()
+        self._allowed = os.sched_getaffinity(0)
         hello = HEAD.unpack(self._receive("its start")[0])
         numbers: list[int] = list(hello[4:9])
         self.load, self.find, self.last_error, self.callbacks2, self.log3 = numbers
@@ -83,10 +84,19 @@ class Connection:
             message.take(argument, types[i] if i < len(types) else None, i)
             for i, argument in enumerate(arguments)
         ]
+        self._follow()
         self._send(message.pack(function, values))
         head, rest = self._receive(name)
         message.put_back(rest)
         return int(HEAD.unpack(head)[1])
+
+    def _follow(self) -> None:
+        """Keep the process on the processors that this one may run on, see ``following``."""
+        allowed = os.sched_getaffinity(0)
+        if allowed != self._allowed:
+            self._allowed = allowed
+            with contextlib.suppress(OSError):  # it has ended, which the missing answer tells
+                os.sched_setaffinity(self._process.pid, allowed)
 
     def _send(self, data: bytes) -> None:
         with contextlib.suppress(BrokenPipeError):  # the missing answer tells
