@@ -43,7 +43,10 @@ class History:
         self._newest[...] = answer.wrench
         if self.count < len(self.wrenches):
             self.count += 1
-        self.response = None if answer.response is None else answer.response.copy()
+        if answer.response is None or self.response is None:
+            self.response = None if answer.response is None else answer.response.copy()
+        else:
+            self.response[...] = answer.response
         if answer.added_inertia is not None:
             content = answer.added_inertia.tobytes()
             if content != self._added_bytes:  # it seldom changes, and to compare is cheaper than to check

@@ -78,7 +78,9 @@ class MechanismPlant:
     def twist(self, state: State) -> Array:
         """Return the twists of the bodies, shape (n, 6), linear first, in W."""
         self.multibody.motion(state.values, self._motion)
-        return np.hstack([self._motion.linear, self._motion.angular])
+        twist = np.empty((self.multibody.n, 6))
+        twist[:, :3], twist[:, 3:] = self._motion.linear, self._motion.angular
+        return twist
 
     def inertia(self, state: State, added_inertia: Array | None, response: Array) -> Array:
         """Return what a response amounts to as inertia; see :class:`linkwind.coupling.Plant`."""

@@ -129,7 +129,8 @@ class Multibody:
         self._results_at = [first + 8 * (self.nv if i else 0) + 48 * self.n * max(0, i - 1) for i in range(4)]
         self._step = ctypes.create_string_buffer(_macro_step.size)
         self._fault_at, self._step_at = ctypes.addressof(self._fault), ctypes.addressof(self._step)
-        self._affine, self._scratch = ctypes.create_string_buffer(_affine.size), np.zeros(0)
+        self._affine = ctypes.create_string_buffer(_affine.size)
+        self._met, self._scratch = np.zeros(0), np.zeros(0)  # made when an affine wrench comes
         self._known: dict[int, tuple[Array, int]] = {}
         pointers = {name: array.ctypes.data for name, array in arrays.items()}
         native = CTables(n=self.n, nq=self.nq, nv=self.nv, **pointers)
@@ -254,15 +255,18 @@ class Multibody:
         if about.shape != (n, 6):
             self._refuse("about", (n, 6), about)
         self._prepare(state, h, nodes, wrenches, added_inertia, integrator, substeps, rtol, atol)
-        if not len(self._scratch):
-            self._scratch = np.zeros(_affine_size(n))
-        wrench, held, inertia = np.empty((n, 6)), np.empty((n, 6)), np.empty((n, 6, 6))
-        addresses = map(address, (response, about, wrench, held, inertia, self._scratch))
-        _affine.pack_into(self._affine, 0, *addresses)
+        if not len(self._met):
+            self._met, self._scratch = np.zeros(48 * n), np.zeros(_affine_size(n))
+        first = self._locate(self._met)
+        results_at = (first, first + 48 * n, first + 96 * n)
+        given_at = (self._locate(response), address(about))
+        _affine.pack_into(self._affine, 0, *given_at, *results_at, self._locate(self._scratch))
         if status := _advance_affine(self._model, self._step_at, ctypes.addressof(self._affine)):
             arguments = {"h": h, "nodes": nodes, "integrator": integrator, "substeps": substeps}
             fail(status, self._fault, self._names, arguments | {"rtol, atol": (rtol, atol)})
-        return self._next.copy(), self._work.copy(), AffineStep(wrench, held, inertia)
+        met = self._met.copy()
+        parts = met[: 6 * n].reshape(n, 6), met[6 * n : 12 * n].reshape(n, 6), met[12 * n :].reshape(n, 6, 6)
+        return self._next.copy(), self._work.copy(), AffineStep(*parts)
 
     def affine_inertia(self, state: Array, added_inertia: Array | None, response: Array, h: float) -> Array:
         """Return the added inertia, shape (n, 6, 6), body frame, that G amounts to over a step of h [s].

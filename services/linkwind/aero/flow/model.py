@@ -55,6 +55,11 @@ class Flow:
         self._boundary = Boundary(len(acted), markers(acted, list(scenario.joints), self._grid.cell))
         self._interior = Interior(acted, self._grid.density)
         self._reach = np.array([0.5 * body.shape.reference_length for body in acted if body.shape])
+        self._lengths = np.array([1.0, 1.0, self._grid.cell])  # of a force, a force, a torque
+        each = np.tile(self._lengths, len(acted))
+        self._squares = np.outer(each, each)
+        rows = (6 * np.arange(len(acted))[:, None] + np.array([0, 1, 5])).ravel()
+        self._planar_entries = np.ix_(rows, rows)  # of G in space
         self._every = max(1, round(scenario.steps / provider.flow.frames)) if provider.flow.frames else 0
         self._h = scenario.coupling.step_ns / 1e9
         self._substeps = self._grid.substeps
@@ -195,23 +200,21 @@ class Flow:
         self._place(t, self._trial)
         wall = self._wall(t, self._trial.twist)
         self._boundary.evaluate(self._window.twists(wall))
-        scale = self._scale()
-        n, step = len(self._bodies), self._window.step
-        per = np.tile(np.array([1.0, 1.0, self._grid.cell]), n)
-        force = self._boundary.wrench * (scale * per[:3])
-        response = self._boundary.response * (scale / self._window.speed * np.outer(per, per))
+        scale, n = self._scale(), len(self._bodies)
+        force = self._boundary.wrench * (scale * self._lengths)
+        response = self._boundary.response * (scale / self._window.speed * self._squares)
         if t > 0.0 and self._interior.any:
             inertia = self._interior.inertia(self._trial.pose)
             force += self._inside(t, wall, inertia)
             for i in range(n):
-                response[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] -= inertia[i] / step
+                response[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] -= inertia[i] / self._h
         return force, response
 
     def _several_steps(self, t: float) -> Array:
         """Step the fluid to the trial state; return the mean force, shape (n, 3)."""
         self._kept, self._ahead = self._window.save(), True
         before, count = t - self._h, self._substeps
-        total, per = np.zeros((len(self._bodies), 3)), np.array([1.0, 1.0, self._grid.cell])
+        total = np.zeros((len(self._bodies), 3))
         for i in range(1, count + 1):
             now = before + self._h * i / count
             at = between(self._accepted, self._trial, i / count, self._h)
@@ -220,7 +223,7 @@ class Flow:
             self._boundary.evaluate(self._window.twists(wall))
             total += self._boundary.wrench
             self._leak = self._window.go(self._boundary, at.pose, wall)
-        force = total * (self._scale() / count * per)
+        force = total * (self._scale() / count * self._lengths)
         if self._interior.any:
             inertia = self._interior.inertia(self._trial.pose)
             force += self._inside(t, self._wall(t, self._trial.twist), inertia)
@@ -270,16 +273,14 @@ class Flow:
         if not np.isfinite(force).all():
             raise SimulationError(
                 f"{self._item('cells')}: expected a finite force at t = {t:.6g} s; got {force.tolist()}: "
-                f"the fluid "
-                "is unstable. Use a smaller coupling.step, more cells, or a longer start_time."
+                "the fluid is unstable. Use a smaller coupling.step, more cells, or a longer start_time."
             )
         wrench.force.fill(0.0)
         wrench.torque.fill(0.0)
         wrench.force[:, :2], wrench.torque[:, 2] = force[:, :2], force[:, 2]
         if wrench.response is not None:
-            rows = (6 * np.arange(len(self._bodies))[:, None] + np.array([0, 1, 5])).ravel()
             wrench.response.fill(0.0)
-            wrench.response.reshape(6 * len(self._bodies), -1)[rows[:, None], rows] = response
+            wrench.response[self._planar_entries] = response
         if wrench.diagnostics is not None:
             speed = max(self._trial.fastest(self._reach), math.hypot(*self._grid.wind))
             wrench.diagnostics[:] = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -22,15 +23,25 @@ class Planar(NamedTuple):
 
     def fastest(self, reach: Array) -> float:
         """Return the largest speed of a point up to ``reach`` [m] from the centres of mass, shape (n,)."""
-        x, y, turn = self.twist.T
-        return float((np.sqrt(x * x + y * y) + np.abs(turn) * reach).max())
+        fastest = 0.0
+        for (x, y, turn), far in zip(self.twist.tolist(), reach.tolist(), strict=True):
+            speed = math.hypot(x, y) + abs(turn) * far
+            if not speed <= fastest:  # not a number stays visible
+                fastest = speed
+        return fastest
 
 
 def planar(motion: Motion, bodies: Array) -> Planar:
     """Return the motion of some of the bodies in the plane."""
-    w, z = motion.orientation[bodies, 0], motion.orientation[bodies, 3]
-    pose = np.column_stack([motion.position[bodies, :2], w * w - z * z, 2.0 * w * z])
-    return Planar(pose, np.column_stack([motion.linear[bodies, :2], motion.angular[bodies, 2]]))
+    pose, twist = np.empty((len(bodies), 4)), np.empty((len(bodies), 3))
+    orientation = motion.orientation[bodies]
+    w, z = orientation[:, 0], orientation[:, 3]
+    pose[:, :2] = motion.position[bodies, :2]
+    pose[:, 2] = w * w - z * z
+    pose[:, 3] = 2.0 * w * z
+    twist[:, :2] = motion.linear[bodies, :2]
+    twist[:, 2] = motion.angular[bodies, 2]
+    return Planar(pose, twist)
 
 
 def between(start: Planar, end: Planar, share: float, h: float) -> Planar:

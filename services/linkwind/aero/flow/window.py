@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 
 import numpy as np
@@ -66,10 +67,10 @@ class Window:
 
     def go(self, boundary: Boundary, pose: Array, twist: Array) -> float:
         """Step the fluid with bodies that are placed, and follow them; return the leak [m/s]."""
-        away = self.poses(pose)[:, :2].mean(axis=0) - self._stand
-        shift = np.where(np.abs(away) > SLACK, np.sign(away), 0.0).astype(np.int64)
-        leak = boundary.step(self.lattice, self.twists(twist), (int(shift[0]), int(shift[1])))
-        self.offset += shift
+        away = (self.poses(pose)[:, :2].mean(axis=0) - self._stand).tolist()
+        x, y = (int(math.copysign(1.0, far)) if abs(far) > SLACK else 0 for far in away)
+        leak = boundary.step(self.lattice, self.twists(twist), (x, y))
+        self.offset += (x, y)
         return leak * self.speed
 
     def halve(self, viscosity: float) -> None:
