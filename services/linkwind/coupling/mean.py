@@ -17,8 +17,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from linkwind.coupling.base import CommunicationPoint, Exchange, Met, Plant, Settings, State
+from linkwind.coupling.base import CommunicationPoint, Exchange, Plant, Settings, State
 from linkwind.coupling.history import History
+from linkwind.coupling.response import correct, predict
 
 
 def run(
@@ -35,7 +36,7 @@ def run(
         history.add(step, exchange(step, 0, accepted, trial))
         held, inertia = newest, history.added_inertia
         if step > 0:
-            accepted, newest[...], held, inertia = _correct(plant, history, accepted, trial)
+            accepted, newest[...], held, inertia = correct(plant, history, accepted, trial, 1)
         elif history.response is not None:
             inertia = plant.inertia(initial, inertia, history.response)
         yield CommunicationPoint(step, accepted, trial, held.copy(), inertia, 0, (), 1)
@@ -45,14 +46,4 @@ def _predict(plant: Plant, history: History, before: State, accepted: State) -> 
     nodes, wrenches = history.behind[1]
     if history.response is None:
         return plant.advance(accepted, nodes, wrenches, history.added_inertia)
-    about = 2.0 * plant.twist(accepted) - plant.twist(before)
-    return plant.meet(accepted, nodes, wrenches, history.added_inertia, history.response, about).state
-
-
-def _correct(plant: Plant, history: History, accepted: State, trial: State) -> Met:
-    nodes, wrenches = history.through[1]
-    added = history.added_inertia
-    if history.response is not None:
-        return plant.meet(accepted, nodes, wrenches, added, history.response, plant.twist(trial))
-    state = plant.advance(accepted, nodes, wrenches, added)
-    return Met(state, wrenches[0], wrenches[0], added)
+    return predict(plant, history, accepted, 2.0 * plant.twist(accepted) - plant.twist(before))

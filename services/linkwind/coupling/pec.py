@@ -20,7 +20,8 @@ below 1.00 with an adaptive one.
 Added inertia: the prediction takes that of the last answer, the correction the new one.
 
 Response: where an answer says how the wrench depends on the twist at the end of the step, the correction
-finds the wrench that belongs to the twist it leads to, in the same exchange.
+finds the wrench that belongs to the twist it leads to, in the same exchange; the stiffer, the lower its
+order, and a prediction that would grow is made with the last response instead (`response`).
 
 Mean wrenches (``settings.held``) have a module of their own, `mean`.
 """
@@ -32,6 +33,7 @@ from collections.abc import Iterator
 from linkwind.coupling import mean
 from linkwind.coupling.base import CommunicationPoint, Exchange, Plant, Settings, State
 from linkwind.coupling.history import History
+from linkwind.coupling.response import EXPLICIT, correct, predict, stiffness, through
 from linkwind.coupling.startup import START_STEPS, start
 
 
@@ -42,25 +44,22 @@ def run(
     if settings.held:
         yield from mean.run(plant, exchange, initial, steps, settings)
         return
-    through = max(1, settings.order) + 1  # so many wrenches the correction goes
-    history = History(len(settings.weight), depth=max(START_STEPS[settings.order] + 1, through))
+    weight, order = settings.weight, settings.order
+    history = History(len(weight), depth=max(START_STEPS[order] + 1, max(1, order) + 1))
 
     points, degree = start(plant, exchange, initial, steps, settings, history)
     yield from points
     accepted, newest = points[-1].state, history.wrenches[0]
     for step in range(len(points), steps + 1):
         d = degree.next
-        nodes, wrenches = history.behind[d + 1]
-        trial = plant.advance(accepted, nodes, wrenches, history.added_inertia)
-        history.add(step, exchange(step, 0, accepted, trial))
-        nodes, wrenches = history.through[min(through, history.count)]
-        if history.response is None:
-            accepted = plant.advance(accepted, nodes, wrenches, history.added_inertia)
+        if stiffness(plant, accepted, history, weight) > EXPLICIT:
+            d, trial = 0, predict(plant, history, accepted, plant.twist(accepted))
         else:
-            met = plant.meet(
-                accepted, nodes, wrenches, history.added_inertia, history.response, plant.twist(trial)
-            )
-            accepted, newest[...] = met.state, met.wrench
+            nodes, wrenches = history.behind[d + 1]
+            trial = plant.advance(accepted, nodes, wrenches, history.added_inertia)
+        history.add(step, exchange(step, 0, accepted, trial))
+        count = min(through(order, stiffness(plant, trial, history, weight)), history.count)
+        accepted, newest[...], _, _ = correct(plant, history, accepted, trial, count)
         degree.add(newest)
         yield CommunicationPoint(
             step, accepted, trial, newest.copy(), history.added_inertia, d, degree.errors, 1

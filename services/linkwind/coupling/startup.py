@@ -23,6 +23,7 @@ from math import nan
 from linkwind.coupling.base import CommunicationPoint, Exchange, Plant, Settings, State
 from linkwind.coupling.degree import DegreeControl, alternates
 from linkwind.coupling.history import History
+from linkwind.coupling.response import EXPLICIT, stiffness
 
 START_STEPS = (0, 1, 2, 5)  # by p
 
@@ -48,6 +49,8 @@ def start(
         points.append(CommunicationPoint(step, trial, trial, newest, history.added_inertia, p, unknown, 1))
         points = _again(plant, points, history, step)
         accepted = points[-1].state
+        if stiffness(plant, accepted, history, settings.weight) > EXPLICIT:
+            break  # predictions of the start-up would grow; the response has no use for it
         if step == 2 and settings.adaptive and alternates(settings.weight, *history.wrenches[:3]):
             break
     return _settle(plant, points, settings, history)
