@@ -38,8 +38,12 @@ static int is_outside(const lw_lattice *l, const int32_t *cell) {
 }
 
 static void weigh(const double *at, const int32_t *cell, double *weight) {
-    for (int q = 0; q < LW_STENCIL; ++q)
-        weight[q] = delta(at[0] - (cell[0] + q % 3 - 1)) * delta(at[1] - (cell[1] + q / 3 - 1));
+    double x[3], y[3];
+    for (int i = 0; i < 3; ++i) {
+        x[i] = delta(at[0] - (cell[0] + i - 1));
+        y[i] = delta(at[1] - (cell[1] + i - 1));
+    }
+    for (int q = 0; q < LW_STENCIL; ++q) weight[q] = x[q % 3] * y[q / 3];
 }
 
 /* Velocity and 1 / (2 density) of a cell after it has streamed, without force. */
@@ -51,9 +55,10 @@ static double streamed(const lw_lattice *l, int64_t cell, double velocity[2]) {
         f[q] = (double)l->populations[q * l->plane + cell + from[q]];
         density += f[q];
     }
-    velocity[0] = (f[1] - f[3] + f[5] - f[6] - f[7] + f[8]) / density;
-    velocity[1] = (f[2] - f[4] + f[5] + f[6] - f[7] - f[8]) / density;
-    return 0.5 / density;
+    double inverse = 1.0 / density;
+    velocity[0] = (f[1] - f[3] + f[5] - f[6] - f[7] + f[8]) * inverse;
+    velocity[1] = (f[2] - f[4] + f[5] + f[6] - f[7] - f[8]) * inverse;
+    return 0.5 * inverse;
 }
 
 static int64_t stencil_cell(const lw_lattice *l, const int32_t *middle, int q) {

@@ -24,7 +24,7 @@ TIME = 0.125
 VALUES = dict(
     zip(
         ("t", "x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz"),
-        (TIME, *MOTION.position[0], *MOTION.linear[0], *MOTION.angular[0]),
+        (TIME, *np.hstack([MOTION.position[0], MOTION.linear[0], MOTION.angular[0]]).tolist()),
         strict=True,
     ),
     theta=math.atan2(2 * math.cos(0.35) * math.sin(0.35), math.cos(0.35) ** 2 - math.sin(0.35) ** 2),
