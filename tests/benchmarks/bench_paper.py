@@ -1,7 +1,7 @@
 """The paper's case in a resolved flow: two links at 48 cells each, 512 × 448 cells, 1.2 s in 12,000 steps.
 
-- Processor time of the whole run in one process and one thread: both sides, messages, log with 48 pictures, no
-  report. At most 12 s.
+- Processor time of the whole run in one process and one thread: both sides, messages, log with 48 pictures,
+  no report. At most 12 s.
 - Of the aero side, the share of time that is not in the lattice's kernel. At most a quarter.
 - From the command to the end of its first step, report and all. At most 3 s.
 

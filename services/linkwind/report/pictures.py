@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from linkwind.frames import FlowFrame
+from linkwind.report.closeup import closeups
 from linkwind.report.data import Run
 from linkwind.report.flow import Flow, shown, speed
 from linkwind.scenario.shapes import shape_of
@@ -48,7 +49,7 @@ def png(run: Run, flow: Flow) -> tuple[bytes, int, int, list[float]]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
 
-    frames = list(flow.some(shown(flow.t)))
+    frames = closeups(run, list(flow.some(shown(flow.t))))
     drawn, data = io.BytesIO(), io.BytesIO()
     with matplotlib.rc_context(STYLE):
         figure, fills = _figure(run, flow, frames)
