@@ -6,6 +6,7 @@ import math
 import struct
 
 import numpy as np
+from numpy.typing import NDArray
 
 from linkwind.aero.flow.grid import FRINGE, Grid
 from linkwind.errors import ProtocolError
@@ -41,6 +42,8 @@ class Window:
             threads=threads,
         )
         self.offset = np.zeros(2, dtype=np.int64)
+        self._kept: NDArray[np.float32] | None = None
+        self._kept_offset = np.zeros(2, dtype=np.int64)
         self.step = grid.step
         self._cell = grid.cell
         self._stand = np.array([grid.place[0] * columns, grid.place[1] * rows])
@@ -93,6 +96,21 @@ class Window:
             seen.density * np.float32(density * self.speed**2 / 3.0),
             seen.vorticity / np.float32(self.step),
         )
+
+    def keep(self) -> None:
+        """Remember the fluid, to come ``back`` to it for another coupling iteration."""
+        if self._kept is None:
+            self._kept = np.empty_like(self.lattice.populations)
+        np.copyto(self._kept, self.lattice.populations)
+        self._kept_offset[:] = self.offset
+
+    def back(self) -> None:
+        """Exchange the fluid for the one that ``keep`` remembered."""
+        if self._kept is not None:
+            ahead, offset = self.lattice.populations.copy(), self.offset.copy()
+            np.copyto(self.lattice.populations, self._kept)
+            self.offset[:] = self._kept_offset
+            self._kept, self._kept_offset = ahead, offset
 
     def save(self) -> bytes:
         """Return everything that changes, as an opaque blob."""
