@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
+from linkwind.aero.base import Capabilities
 from linkwind.aero.service import serve
 from linkwind.bus.inprocess import InProcessLink
 from linkwind.bus.zenoh import ZenohDynamicsLink, ZenohProviderLink, loopback_endpoint
@@ -211,8 +212,13 @@ def test_model_that_cannot_be_built_ends_the_hand_shake(
     endpoint: str, open_link: Callable[..., ZenohDynamicsLink]
 ) -> None:
     class Unbuildable(FakeModel):
-        def save(self) -> bytes:
+        @property
+        def capabilities(self) -> Capabilities:
             raise SimulationError("no such wing")
+
+        @capabilities.setter
+        def capabilities(self, value: Capabilities) -> None:
+            pass
 
     d = session()
     link = open_link(d)
