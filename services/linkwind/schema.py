@@ -22,7 +22,9 @@ def _classes() -> dict[str, Any]:
     pool = descriptor_pool.DescriptorPool()
     for file in descriptor_pb2.FileDescriptorSet.FromString(DESCRIPTOR_SET).file:
         pool.Add(file)
-    names = ("MotionStep", "WrenchStep", "Motion", "Control", "FlowFrame", "State", "Step", "Timing")
+    names = (
+        "MotionStep", "WrenchStep", "Motion", "Control", "FlowFrame", "Checkpoint", "State", "Step", "Timing",
+    )  # fmt: skip
     return {
         name: message_factory.GetMessageClass(pool.FindMessageTypeByName(f"linkwind.v1.{name}"))
         for name in names

@@ -11,7 +11,7 @@ from linkwind.scenario import from_json, load, loads
 from tests.scenario.texts import SMALL, TWO_LINK, edited
 
 BODY_KEYS = "name, mass, inertia, shape, position, angle_deg, orientation, velocity, angular_velocity"
-TOP_KEYS = "name, description, time, environment, bodies, joints, providers, dynamics, coupling, bus, aero"
+TOP_KEYS = "name, description, time, environment, bodies, joints, providers, dynamics, coupling, bus, log, aero"
 SECOND_HINGE = """
 [[joints]]
 name = "second"

@@ -57,6 +57,8 @@ def serve(link: ProviderLink, provider: ProviderSession, start_timeout: float) -
             answer = provider.answer(link.receive())
             for frame in provider.frames():
                 link.show(frame)
+            for checkpoint in provider.checkpoints():
+                link.keep(checkpoint)
             if answer is not None:
                 link.reply(answer)
     except Exception as error:

@@ -1,8 +1,8 @@
 """What a transport has to offer: the two ends of the bus.
 
 A transport moves ``(key, bytes)`` and tells who is there; it knows no message but Fault. Keys are
-``linkwind/v1/<run>/motion``, ``…/wrench/<provider>``, ``…/observe/flow/<provider>``, ``…/control``,
-``…/fault`` and ``…/alive/<participant>``.
+``linkwind/v1/<run>/motion``, ``…/wrench/<provider>``, ``…/observe/flow/<provider>``,
+``…/observe/checkpoint/<provider>``, ``…/control``, ``…/fault`` and ``…/alive/<participant>``.
 """
 
 from __future__ import annotations
@@ -50,6 +50,10 @@ class DynamicsLink(Protocol):
         """
         ...
 
+    def checkpoints(self) -> list[tuple[str, bytes]]:
+        """Take the checkpoints that have come, like :meth:`frames`."""
+        ...
+
     def fault(self, payload: bytes) -> None:
         """Tell every provider that the run is over, and why."""
         ...
@@ -85,6 +89,10 @@ class ProviderLink(Protocol):
 
     def show(self, frame: bytes) -> None:
         """Send a frame to the dynamics."""
+        ...
+
+    def keep(self, checkpoint: bytes) -> None:
+        """Send a checkpoint to the dynamics."""
         ...
 
     def reply(self, wrench: bytes) -> None:

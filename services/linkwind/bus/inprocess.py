@@ -22,6 +22,7 @@ class InProcessLink:
         self._providers = list(providers)
         self._answers: deque[tuple[str, bytes]] = deque()
         self._frames: list[tuple[str, bytes]] = []
+        self._checkpoints: list[tuple[str, bytes]] = []
         self._trouble: FaultError | None = None
         try:
             for provider in self._providers:
@@ -48,6 +49,7 @@ class InProcessLink:
                 self._trouble.__cause__ = self._trouble.__cause__ or error
                 continue
             self._frames += [(provider.name, frame) for frame in provider.frames()]
+            self._checkpoints += [(provider.name, one) for one in provider.checkpoints()]
             if answer is None:
                 self._session.control(provider.bye())
             else:
@@ -66,6 +68,11 @@ class InProcessLink:
     def frames(self) -> list[tuple[str, bytes]]:
         """Take the frames of the last answers."""
         taken, self._frames = self._frames, []
+        return taken
+
+    def checkpoints(self) -> list[tuple[str, bytes]]:
+        """Take the checkpoints of the last answers."""
+        taken, self._checkpoints = self._checkpoints, []
         return taken
 
     def fault(self, payload: bytes) -> None:

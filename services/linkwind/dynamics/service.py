@@ -21,7 +21,7 @@ from linkwind.dynamics.recorder import Recorder
 from linkwind.dynamics.timing import ExchangeTimes
 from linkwind.errors import LostError, StoppedError
 from linkwind.mechanism import Mechanism
-from linkwind.protocol import DynamicsSession, fault
+from linkwind.protocol import Course, DynamicsSession, fault
 from linkwind.scenario import Scenario
 from linkwind.spatial import Array, Motion
 
@@ -64,6 +64,7 @@ class DynamicsService:
             bodies=mechanism.bodies,
             providers={p.name: p.bodies for p in scenario.providers},
         )
+        self.session.course = Course(scenario.log.checkpoint_every)
         self._scenario = scenario
         self.mechanism = mechanism
         self._plant = MechanismPlant(mechanism, scenario, self.session.where)
@@ -163,15 +164,18 @@ class DynamicsService:
         took = time.perf_counter_ns() - start
         self._times.add(took)
         self._recorder.timing(step, motion.time_ns, took)
-        self._take_frames()
+        self._take_shown()
         return Answer(*session.total())
 
     def _write_pending(self) -> None:
         while self._pending:
             self._recorder.point(self._pending.popleft())
 
-    def _take_frames(self) -> None:
-        """Write the frames that came with the last answers: after all of these, whoever answered first."""
+    def _take_shown(self) -> None:
+        """Write frames and checkpoints that came with the last answers: after all of these, in one order."""
+        for provider, payload in sorted(self._link.checkpoints(), key=lambda sent: sent[0]):
+            time_ns = self.session.checkpoint(provider, payload).time_ns
+            self._recorder.checkpoint(provider, payload, time_ns)
         for provider, payload in sorted(self._link.frames(), key=lambda sent: sent[0]):
             self._recorder.frame(provider, self.session.frame(provider, payload))
 
@@ -186,7 +190,7 @@ class DynamicsService:
         if not self._link.wait(lambda: not self.session.not_gone, GOODBYE_TIMEOUT, poll):
             missing = " and ".join(f'"{name}"' for name in self.session.not_gone)
             raise LostError(f"{missing} did not say Bye within {GOODBYE_TIMEOUT:g} s of the last step")
-        self._take_frames()
+        self._take_shown()
         self.session.check_frames()
 
     def _digest(self, final: State) -> str:

@@ -15,6 +15,7 @@ PACKAGE = "linkwind.v1."
 MOTION, STATE, STEP, TIMING = "/motion", "/state", "/step", "/timing"
 WRENCH = "/wrench/"  # and the name of the provider
 FLOW = "/flow/"  # and the name of the provider: foxglove.Grid
+CHECKPOINT = "/checkpoint/"  # and the name of the provider
 TRANSFORMS, SCENE = "/tf", "/scene"  # pictures for Foxglove, decimated
 
 MESSAGE_OF = {MOTION: "MotionStep", STATE: "State", STEP: "Step", TIMING: "Timing"}
@@ -29,7 +30,10 @@ END = "linkwind.end"  # metadata: how the run ended; missing when the writer was
 
 def message_name(topic: str) -> str | None:
     """Return the name of the message that a topic carries, None for a topic that is not linkwind's."""
-    return "WrenchStep" if topic.startswith(WRENCH) else MESSAGE_OF.get(topic)
+    for start, name in ((WRENCH, "WrenchStep"), (CHECKPOINT, "Checkpoint")):
+        if topic.startswith(start):
+            return name
+    return MESSAGE_OF.get(topic)
 
 
 def sealed(record: dict[str, str]) -> dict[str, str]:

@@ -84,9 +84,8 @@ class LogWriter:
                 f"{self.path}: expected to make a new log file; got {error.strerror}. Choose another --out."
             ) from error
         # Without seeking, the SDK writes a chunk in one piece, never a part of it.
-        options = MCAPWriteOptions(
-            compression=None, chunk_size=CHUNK_SIZE, disable_seeking=True, profile=contents.PROFILE
-        )
+        how: dict[str, Any] = {"compression": None, "chunk_size": CHUNK_SIZE, "disable_seeking": True}
+        options = MCAPWriteOptions(profile=contents.PROFILE, **how)
         self._context = Context()
         self._writer = open_mcap(self._file, context=self._context, writer_options=options)
 
@@ -124,7 +123,7 @@ class LogWriter:
         self._transforms = FrameTransformsChannel(contents.TRANSFORMS, context=self._context)
         self._scenes = SceneUpdateChannel(contents.SCENE, context=self._context)
         self._opened += [self._transforms, self._scenes]
-        self._flow: dict[str, Callable[[bytes, int], None]] = {}  # opened when there is a frame
+        self._rare: dict[str, Callable[[bytes, int], None]] = {}  # opened when there is a message
 
     def _channel(self, topic: str, kind: Schema | None = None) -> Callable[[bytes, int], None]:
         """Open a channel; return its method that logs a payload at a time, without the layers above.
@@ -165,7 +164,7 @@ class LogWriter:
         self._timing(payload, time_ns)
 
     def scene(self, time_ns: int, motion: Motion, wrench: Wrench) -> None:
-        """Log pictures for Foxglove, of every so many-th call; call it once a communication point.
+        """Log pictures for Foxglove, of every so many-th call; called once a communication point.
 
         Args:
             time_ns: simulation time [ns].
@@ -180,9 +179,15 @@ class LogWriter:
 
     def frame(self, provider: str, frame: FlowFrame) -> None:
         """Log a frame of the fluid that ``provider`` showed, at the frame's own time."""
-        if provider not in self._flow:
-            self._flow[provider] = self._channel(contents.FLOW + provider, Grid.get_schema())
-        self._flow[provider](grid.encode(frame), frame.time_ns)
+        self._seldom(contents.FLOW + provider, Grid.get_schema())(grid.encode(frame), frame.time_ns)
+
+    def checkpoint(self, provider: str, payload: bytes, time_ns: int) -> None:
+        """Log an encoded Checkpoint of ``provider``, at the checkpoint's own time."""
+        self._seldom(contents.CHECKPOINT + provider)(payload, time_ns)
+
+    def _seldom(self, topic: str, kind: Schema | None = None) -> Callable[[bytes, int], None]:
+        self._rare[topic] = self._rare.get(topic) or self._channel(topic, kind)
+        return self._rare[topic]
 
     def diagnostics(self, names: Mapping[str, Sequence[str]]) -> None:
         """Record the names of the numbers that providers report with their wrenches; none, nothing."""

@@ -6,6 +6,17 @@ Each side takes bytes and gives bytes; ``bus/`` moves them. The protocol itself 
 
 from linkwind.protocol.control import fault, fault_error, refuse
 from linkwind.protocol.dynamics import DynamicsSession
-from linkwind.protocol.provider import Model, ProviderSession, ProviderState
+from linkwind.protocol.handshake import Course
+from linkwind.protocol.memory import Model
+from linkwind.protocol.provider import ProviderSession, ProviderState
 
-__all__ = ["DynamicsSession", "Model", "ProviderSession", "ProviderState", "fault", "fault_error", "refuse"]
+__all__ = [
+    "Course",
+    "DynamicsSession",
+    "Model",
+    "ProviderSession",
+    "ProviderState",
+    "fault",
+    "fault_error",
+    "refuse",
+]

@@ -6,10 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from linkwind import checkpoints, frames
+from linkwind.checkpoints import Checkpoint
 from linkwind.errors import ProtocolError, SimulationError
-from linkwind.frames import FlowFrame, decode
+from linkwind.frames import FlowFrame
 from linkwind.messages import MotionMessage
-from linkwind.protocol.handshake import HandShake
+from linkwind.protocol.handshake import HandShake, Participant
 from linkwind.spatial import Array
 
 
@@ -99,26 +101,49 @@ class DynamicsSession(HandShake):
         Raises:
             ProtocolError: unknown provider, not a frame of this run, or one before it was lost.
         """
-        known = self.participants.get(provider)
-        if known is None:
-            raise ProtocolError(f'frame from "{provider}": it does not take part in run {self.run}')
-        number, frame = decode(payload, self.run, provider)
-        if number != known.frames + 1:
-            raise ProtocolError(
-                f'frame from "{provider}": {self.where()}: expected number {known.frames + 1}; got {number}. '
-                "A frame was lost."
-            )
+        known = self._sender(provider, "frame")
+        number, frame = frames.decode(payload, self.run, provider)
+        self._check_number("frame", provider, known.frames + 1, number)
         known.frames = number
         return frame
 
+    def checkpoint(self, provider: str, payload: bytes) -> Checkpoint:
+        """Take a checkpoint.
+
+        Raises:
+            ProtocolError: unknown provider, not a checkpoint of this run, or one before it was lost.
+        """
+        known = self._sender(provider, "checkpoint")
+        number, checkpoint = checkpoints.decode(payload, self.run, provider)
+        self._check_number("checkpoint", provider, known.checkpoints + 1, number)
+        known.checkpoints = number
+        return checkpoint
+
+    def _sender(self, provider: str, what: str) -> Participant:
+        known = self.participants.get(provider)
+        if known is None:
+            raise ProtocolError(f'{what} from "{provider}": it does not take part in run {self.run}')
+        return known
+
+    def _check_number(self, what: str, provider: str, expected: int, got: int) -> None:
+        if got != expected:
+            raise ProtocolError(
+                f'{what} from "{provider}": {self.where()}: expected number {expected}; got {got}. '
+                f"A {what} was lost."
+            )
+
     def check_frames(self) -> None:
-        """Raise ProtocolError unless all frames are here that the providers say they sent."""
+        """Raise ProtocolError unless all frames and checkpoints are here that the providers say they sent."""
         for p in self.participants.values():
-            if p.frames != p.shown:
-                raise ProtocolError(
-                    f'frames from "{p.name}": expected {p.shown}, as its Bye says; got {p.frames}. '
-                    "The last ones were lost."
-                )
+            for what, sent, got in (
+                ("frames", p.shown, p.frames),
+                ("checkpoints", p.saved, p.checkpoints),
+            ):
+                if got != sent:
+                    raise ProtocolError(
+                        f'{what} from "{p.name}": expected {sent}, as its Bye says; got {got}. '
+                        "The last ones were lost."
+                    )
 
     def total(self) -> tuple[Array, Array | None, Array | None]:
         """Add up the answers of all providers, in the scenario's order.

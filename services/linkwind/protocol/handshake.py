@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from linkwind import __version__
@@ -30,12 +30,31 @@ class Participant:
     kind: str = "point"
     frames: int = 0  # taken so far
     shown: int = 0  # sent, as Bye says
+    checkpoints: int = 0  # taken so far
+    saved: int = 0  # sent, as Bye says
 
     @property
     def answer(self) -> Wrench:
         """Its last answer."""
         assert self.message is not None
         return self.message.wrench
+
+
+@dataclass(frozen=True)
+class Course:
+    """What providers are told of a run besides its scenario.
+
+    Attributes:
+        checkpoint_every: steps from one checkpoint to the next; 0 for none.
+        start: the step that the providers begin after, with ``states``; -1 for the beginning.
+        states: what each provider had saved then.
+        changes: scenarios (JSON) that count from the motion of step + 1 on, by step.
+    """
+
+    checkpoint_every: int = 0
+    start: int = -1
+    states: Mapping[str, bytes] = field(default_factory=dict)
+    changes: Mapping[int, str] = field(default_factory=dict)
 
 
 class HandShake:
@@ -46,6 +65,7 @@ class HandShake:
         bodies: names, in the order of the messages.
         step_ns: communication step size [ns].
         participants: the providers of the scenario, by name, in its order.
+        course: what providers are told besides the scenario; set before anybody asks.
         failure: an error that ends the run, once there is one.
     """
 
@@ -71,6 +91,7 @@ class HandShake:
         self.run = run
         self.bodies = tuple(bodies)
         self.step_ns = step_ns
+        self.course = Course()
         self.failure: LinkwindError | None = None
         self._scenario_json = scenario_json
         self._steps = steps
@@ -113,7 +134,15 @@ class HandShake:
             "bodies": self.bodies,
             "provider_bodies": [self.bodies[i] for i in known.bodies],
         }
-        return Control(welcome=body)
+        return Control(welcome=body | self._course(known.name))
+
+    def _course(self, provider: str) -> dict[str, Any]:
+        course = self.course
+        changes = [{"step": step, "scenario_json": text} for step, text in sorted(course.changes.items())]
+        body: dict[str, Any] = {"checkpoint_every": course.checkpoint_every, "changes": changes}
+        if course.start >= 0:
+            body["resume"] = {"step": course.start, "state": course.states[provider]}
+        return body
 
     def _on_ready(self, message: Any) -> Any:
         ready = message.ready
@@ -145,6 +174,7 @@ class HandShake:
         if message.bye.name in self.participants:
             self.participants[message.bye.name].bye = True
             self.participants[message.bye.name].shown = message.bye.frames
+            self.participants[message.bye.name].saved = message.bye.checkpoints
             self.participants[message.bye.name].answered = True
         return Control(start={})
 

@@ -6,45 +6,16 @@ import logging
 import uuid
 from collections.abc import Callable
 from enum import Enum, auto
-from typing import Protocol
 
 from linkwind import __version__
 from linkwind.errors import ProtocolError, RefusedError
 from linkwind.frames import FlowFrame
 from linkwind.messages import KINDS, MotionMessage, WrenchMessage
 from linkwind.protocol.control import Control, fault, parse
+from linkwind.protocol.memory import Memory, Model
 from linkwind.schema import SHA256
-from linkwind.spatial import Motion, Wrench
 
 _log = logging.getLogger("linkwind")
-
-
-class Capabilities(Protocol):
-    """What a force model can do and returns."""
-
-    @property
-    def kind(self) -> str: ...
-    @property
-    def rollback(self) -> bool: ...
-    @property
-    def added_inertia(self) -> bool: ...
-    @property
-    def response_size(self) -> int: ...
-    @property
-    def own_step_ns(self) -> int: ...
-    @property
-    def diagnostics(self) -> tuple[str, ...]: ...
-
-
-class Model(Protocol):
-    """A force model as the protocol sees it (``linkwind.aero.base.ForceModel`` is one)."""
-
-    @property
-    def capabilities(self) -> Capabilities: ...
-    def commit(self, t: float, motion: Motion) -> None: ...
-    def evaluate(self, t: float, motion: Motion, wrench: Wrench) -> None: ...
-    def save(self) -> bytes: ...
-    def restore(self, blob: bytes) -> None: ...
 
 
 class ProviderState(Enum):
@@ -72,8 +43,7 @@ class ProviderSession:
         self.run = ""
         self.at = (-1, 0)
         self._build = build
-        self._close: Callable[[], None] = lambda: None
-        self._frame: Callable[[], FlowFrame | None] = lambda: None
+        self._memory: Memory | None = None
         self._frames: list[bytes] = []
         self._shown = 0
         self._answer = b""
@@ -101,19 +71,20 @@ class ProviderSession:
         self.run = welcome.run
         self._step_ns = welcome.step_ns
         self._bodies = list(welcome.provider_bodies)
-        self._scenario_json = welcome.scenario_json
+        self._welcome = welcome
         self._motion = MotionMessage(self.run, len(welcome.bodies))
         self.state = ProviderState.WELCOME
 
     def build(self) -> None:
-        """Build the force model from the scenario of the welcome.
+        """Build the force model from the scenario of the welcome, with the memory that comes with it.
 
         Raises:
             InputError: the scenario does not make a model.
+            ProtocolError: the memory is not one of that model.
         """
-        self._model = self._build(self._scenario_json, self.name)
-        self._close = getattr(self._model, "close", self._close)
-        self._frame = getattr(self._model, "frame", self._frame)
+        self._memory = Memory(self._welcome, self.name, self._build)
+        self._use(self._memory.model)
+        self.at = (self._memory.start, 0)
         can = self._model.capabilities
         self._wrench = WrenchMessage(
             self.run,
@@ -124,6 +95,10 @@ class ProviderSession:
             response_size=can.response_size,
             diagnostics=can.diagnostics,
         )
+
+    def _use(self, model: Model) -> None:
+        self._model = model
+        self._frame: Callable[[], FlowFrame | None] = getattr(model, "frame", lambda: None)
 
     def ready(self) -> bytes:
         """Return the message that says that motion can come."""
@@ -160,7 +135,7 @@ class ProviderSession:
         motion.load(payload, f'"{self.name}": motion')
         at = motion.at
         if motion.final:
-            self._model.commit(motion.time_ns / 1e9, motion.accepted)
+            self._commit(motion.at[0], motion.time_ns)
             self._show()
             self.state = ProviderState.DONE
             return None
@@ -203,7 +178,7 @@ class ProviderSession:
         last_step, last_iteration = self.at
         if step == last_step + 1 and iteration == 0:
             if step:
-                self._model.commit((motion.time_ns - self._step_ns) / 1e9, motion.accepted)
+                self._commit(last_step, motion.time_ns - self._step_ns)
         elif step == last_step and iteration == last_iteration + 1:
             if not self._model.capabilities.rollback:
                 raise ProtocolError(f'"{self.name}": iteration {iteration} asked, but it cannot roll back')
@@ -213,13 +188,29 @@ class ProviderSession:
                 f"iteration {iteration}. A motion message was lost."
             )
 
+    def _commit(self, step: int, time_ns: int) -> None:
+        """Take the accepted state, unless it is the one that the memory was saved at."""
+        assert self._memory is not None
+        if step != self._memory.start:
+            self._model.commit(time_ns / 1e9, self._motion.accepted)
+        self._memory.committed(step, time_ns)
+        if self._memory.model is not self._model:
+            self._use(self._memory.model)
+
+    def checkpoints(self) -> list[bytes]:
+        """Take the checkpoints that the last :meth:`answer` brought: to be sent before the answer itself."""
+        return [] if self._memory is None else self._memory.checkpoints()
+
     def bye(self) -> bytes:
         """Return the answer to the final motion."""
-        return bytes(Control(bye={"name": self.name, "frames": self._shown}).SerializeToString())
+        saved = 0 if self._memory is None else self._memory.saved
+        body = {"name": self.name, "frames": self._shown, "checkpoints": saved}
+        return bytes(Control(bye=body).SerializeToString())
 
     def close(self) -> None:
         """End what the force model holds, such as a process of its own."""
-        self._close()
+        if self._memory is not None:
+            self._memory.close()
 
     def fault(self, error: BaseException) -> bytes:
         """Return the message that tells the others that this provider cannot go on."""

@@ -127,6 +127,10 @@ class RecordedWrenches:
         """Nobody is there to show any."""
         return []
 
+    def checkpoints(self) -> list[tuple[str, bytes]]:
+        """Nobody is there to keep any."""
+        return []
+
     def fault(self, payload: bytes) -> None:
         """Nobody is there to be told."""
 

@@ -171,6 +171,9 @@ class _Comparison:
         if provider in self._wrenches:
             self._compare(FLOW + provider, grid.encode(frame), frame.time_ns)
 
+    def checkpoint(self, provider: str, payload: bytes, time_ns: int) -> None:
+        """What a model remembers is its own; what follows from it is compared."""
+
     def diagnostics(self, names: Mapping[str, Sequence[str]]) -> None:
         """Names follow from the scenario and the program."""
 

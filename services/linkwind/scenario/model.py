@@ -11,7 +11,7 @@ from linkwind.scenario.bodies import Body, Joint
 from linkwind.scenario.problems import ProblemError
 from linkwind.scenario.providers import Provider
 from linkwind.scenario.quantities import Section
-from linkwind.scenario.settings import Bus, Coupling, Dynamics, Environment, Time, nanoseconds
+from linkwind.scenario.settings import Bus, Coupling, Dynamics, Environment, Logging, Time, nanoseconds
 
 
 class Scenario(Section):
@@ -35,6 +35,7 @@ class Scenario(Section):
     dynamics: Dynamics = Field(default=Dynamics(), description="How the mechanism is advanced")
     coupling: Coupling = Field(default=Coupling(), description="When motion and wrench are exchanged")
     bus: Bus = Field(default=Bus(), description="How messages travel")
+    log: Logging = Field(default=Logging(), description="What the log holds besides the messages")
 
     _source: str = PrivateAttr(default="")
 

@@ -93,6 +93,16 @@ class Coupling(Section):
         return int(nanoseconds(self.step))
 
 
+class Logging(Section):
+    """What the log of a run holds besides the messages."""
+
+    checkpoint_every: int = Field(
+        default=0,
+        ge=0,
+        description="Steps from one checkpoint of the providers to the next, to resume from; 0: none",
+    )
+
+
 class Bus(Section):
     """How messages travel."""
 

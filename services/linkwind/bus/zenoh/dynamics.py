@@ -6,7 +6,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import zenoh
 from zenoh.handlers import FifoChannel
@@ -65,6 +65,7 @@ class ZenohDynamicsLink(Endpoint):
         self._changed = threading.Condition()
         # Before the wrenches' own: whoever can send a wrench can send a frame.
         self._shown = self._session.declare_subscriber(f"{base}/observe/flow/*", FifoChannel(FRAMES))
+        self._kept = self._session.declare_subscriber(f"{base}/observe/checkpoint/*", FifoChannel(FRAMES))
         self._join(f"{base}/wrench/*", f"{base}/motion", session.run, "dynamics")
         self._control = self._session.declare_queryable(f"{base}/control", self._on_control, complete=True)
 
@@ -138,10 +139,19 @@ class ZenohDynamicsLink(Endpoint):
 
         One session sends frame and wrench over one link, with one priority: zenoh keeps their order.
         """
-        taken = []
-        while (sample := self._shown.try_recv()) is not None:
-            taken.append(_named(sample))
-        return taken
+        return _taken(self._shown)
+
+    def checkpoints(self) -> list[tuple[str, bytes]]:
+        """Take the checkpoints that have come; see :meth:`frames`."""
+        return _taken(self._kept)
+
+
+def _taken(subscriber: Any) -> list[tuple[str, bytes]]:
+    """Return what has come, each with its provider, without waiting."""
+    taken = []
+    while (sample := subscriber.try_recv()) is not None:
+        taken.append(_named(sample))
+    return taken
 
 
 def _named(sample: zenoh.Sample) -> tuple[str, bytes]:

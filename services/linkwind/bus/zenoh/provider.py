@@ -62,8 +62,11 @@ class ZenohProviderLink(Endpoint):
         self._run = key_segment(run, "--run")
         self._joined_at = time.monotonic()
         base, name = f"{PREFIX}/{run}", key_segment(name, "--name")
-        self._frames = self._session.declare_publisher(
-            f"{base}/observe/flow/{name}", congestion_control=zenoh.CongestionControl.BLOCK
+        self._frames, self._checkpoints = (
+            self._session.declare_publisher(
+                f"{base}/observe/{kind}/{name}", congestion_control=zenoh.CongestionControl.BLOCK
+            )
+            for kind in ("flow", "checkpoint")
         )
         self._join(f"{base}/motion", f"{base}/wrench/{name}", run, name)
 
@@ -87,6 +90,10 @@ class ZenohProviderLink(Endpoint):
     def show(self, frame: bytes) -> None:
         """Send a frame to the dynamics."""
         self._frames.put(frame)
+
+    def keep(self, checkpoint: bytes) -> None:
+        """Send a checkpoint to the dynamics."""
+        self._checkpoints.put(checkpoint)
 
     def reply(self, wrench: bytes) -> None:
         """Send a wrench message to the dynamics."""
