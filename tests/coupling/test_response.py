@@ -50,7 +50,7 @@ def test_added_mass_hidden_in_a_mean_wrench_is_right_down_to_no_mass_with_its_re
 
 
 @pytest.mark.filterwarnings("ignore:.*encountered:RuntimeWarning")
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", ["explicit", "pec"])
 def test_without_the_response_the_same_fluid_blows_up_once_it_outweighs_the_mass(scheme):
     light = oscillator(0.3, 1.0, 0.01, 1000, given=False, scheme=scheme)
     heavy = oscillator(3.0, 1.0, 0.01, 1000, given=False, scheme=scheme)

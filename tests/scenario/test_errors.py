@@ -11,7 +11,9 @@ from linkwind.scenario import from_json, load, loads
 from tests.scenario.texts import SMALL, TWO_LINK, edited
 
 BODY_KEYS = "name, mass, inertia, shape, position, angle_deg, orientation, velocity, angular_velocity"
-TOP_KEYS = "name, description, time, environment, bodies, joints, providers, dynamics, coupling, bus, log, aero"
+TOP_KEYS = (
+    "name, description, time, environment, bodies, joints, providers, dynamics, coupling, bus, log, aero"
+)
 SECOND_HINGE = """
 [[joints]]
 name = "second"
@@ -35,7 +37,8 @@ WRONG = [
     ("[dynamics]", "[dynamic]",
      f'dynamic: expected a key among {TOP_KEYS}; got "dynamic". Use "dynamics".'),
     ("order = 3", "order = 3\nqqq = 1",
-     "coupling.qqq: expected a key among scheme, order, adaptive, step, timeout; "
+     "coupling.qqq: expected a key among scheme, order, adaptive, acceleration, tolerance, "
+     "iterations, step, timeout; "
      'got "qqq". Remove it.'),
     ("[aero]", '[aero]\nname = "wind"',
      'aero.name: expected no name besides aero; got "wind". Remove it, or write [[providers]].'),
@@ -45,7 +48,8 @@ WRONG = [
     ('"revolute"', '"hinge"',
      "joints[0].type: expected one of fixed, revolute, prismatic, planar, spherical, free; "
      'got "hinge". Use "revolute".'),
-    ('"pec"', '"implicit"', 'coupling.scheme: expected one of explicit, pec; got "implicit". Use "pec".'),
+    ('"pec"', '"strong"', 'coupling.scheme: expected one of explicit, pec, implicit; '
+    'got "strong". Use one of these.'),
     ('"rk4"', '"ode45"',
      'dynamics.integrator: expected one of euler, semi_implicit_euler, rk4, dopri5; got "ode45". '
      'Use "dopri5".'),

@@ -51,7 +51,8 @@ def test_aero_can_be_set_where_the_file_has_no_provider():
     ("argument", "line"),
     [
         ("coupling.stepp=3",
-         "coupling.stepp: expected a key among scheme, order, adaptive, step, timeout; "
+         "coupling.stepp: expected a key among scheme, order, adaptive, acceleration, tolerance, "
+         "iterations, step, timeout; "
          'got "stepp". Use "step".'),
         ("couplin.step=3",
          "couplin: expected a key among name, description, time, environment, bodies, joints, providers, "

@@ -15,10 +15,10 @@ function ``run`` like those two, one entry here.
 
 from __future__ import annotations
 
-from linkwind.coupling import explicit, pec
+from linkwind.coupling import explicit, implicit, pec
 from linkwind.coupling.base import Answer, CommunicationPoint, Exchange, Met, Plant, Scheme, Settings, State
 
-SCHEMES: dict[str, Scheme] = {"explicit": explicit.run, "pec": pec.run}
+SCHEMES: dict[str, Scheme] = {"explicit": explicit.run, "pec": pec.run, "implicit": implicit.run}
 
 __all__ = [
     "SCHEMES",

@@ -151,12 +151,18 @@ class Settings:
         adaptive: let the degree fall below p where the wrench is not smooth (see `degree`).
         held: the wrench is a mean over the step (kind "mean" of any provider), so it has no value at a point
             and must not be interpolated: it is held over the step that it was averaged over.
+        acceleration: of the coupling iterations (implicit), a name in `acceleration`.
+        tolerance: by which guess and answer may differ, relative, weighted.
+        iterations: most exchanges in a step.
     """
 
     weight: Array
     order: int = 3
     adaptive: bool = True
     held: bool = False
+    acceleration: str = "iqn_ils"
+    tolerance: float = 1e-8
+    iterations: int = 50
 
     def __post_init__(self) -> None:
         weight = np.array(self.weight, dtype=np.float64)

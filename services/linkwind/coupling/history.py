@@ -39,10 +39,18 @@ class History:
 
     def add(self, step: int, answer: Answer) -> None:
         """Keep a copy of the answer for communication point ``step``."""
+        self.shift()
+        self.replace(step, answer)
+
+    def shift(self) -> None:
+        """Move all wrenches down by one; the newest keeps its value until it is written."""
         self._older[...] = self._newer
-        self._newest[...] = answer.wrench
         if self.count < len(self.wrenches):
             self.count += 1
+
+    def replace(self, step: int, answer: Answer) -> None:
+        """Keep a copy of the answer in place of the newest one."""
+        self._newest[...] = answer.wrench
         if answer.response is None or self.response is None:
             self.response = None if answer.response is None else answer.response.copy()
         else:

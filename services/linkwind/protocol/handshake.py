@@ -28,6 +28,7 @@ class Participant:
     message: WrenchMessage | None = None
     diagnostics: tuple[str, ...] = ()
     kind: str = "point"
+    rollback: bool = False
     frames: int = 0  # taken so far
     shown: int = 0  # sent, as Bye says
     checkpoints: int = 0  # taken so far
@@ -157,6 +158,7 @@ class HandShake:
             )
             raise self.failure
         known.kind = {number: kind for kind, number in KINDS.items()}.get(ready.kind, "point")
+        known.rollback = ready.rollback
         known.diagnostics = tuple(ready.diagnostics)
         known.message = WrenchMessage(
             self.run,
@@ -191,6 +193,11 @@ class HandShake:
     def not_ready(self) -> list[str]:
         """Providers that have not said Ready."""
         return [p.name for p in self.participants.values() if not p.ready]
+
+    @property
+    def cannot_go_back(self) -> list[str]:
+        """Providers that cannot evaluate a step again."""
+        return [p.name for p in self.participants.values() if not p.rollback]
 
     @property
     def not_gone(self) -> list[str]:

@@ -76,6 +76,7 @@ class RecordedWrenches:
                 "name": name,
                 "instance": "log",
                 "kind": first.kind,
+                "rollback": True,
                 "added_inertia": len(first.added_inertia) > 0,
                 "response_size": len(first.response),
                 "diagnostics": [str(i) for i in range(len(first.diagnostics))],

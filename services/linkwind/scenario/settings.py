@@ -12,7 +12,8 @@ from linkwind.scenario.quantities import Section, Vector, quantity
 
 Method = Literal["reduced"]
 IntegratorName = Literal["euler", "semi_implicit_euler", "rk4", "dopri5"]
-Scheme = Literal["explicit", "pec"]
+Scheme = Literal["explicit", "pec", "implicit"]
+Acceleration = Literal["aitken", "iqn_ils"]
 Transport = Literal["zenoh", "inprocess"]
 
 ZERO = (0.0, 0.0, 0.0)
@@ -67,10 +68,19 @@ class Coupling(Section):
 
     scheme: Scheme = Field(
         default="pec",
-        description="explicit: the wrench is held over the step; pec: predicted, evaluated, corrected",
+        description="explicit: the wrench is held over the step; pec: predicted, evaluated, corrected; "
+        "implicit: iterated until motion and wrench agree, for providers that can go back",
     )
-    order: int = Field(default=3, ge=0, le=3, description="Degree of the extrapolated wrench (pec)")
-    adaptive: bool = Field(default=True, description="Lower the order where the wrench is not smooth (pec)")
+    order: int = Field(default=3, ge=0, le=3, description="Degree of the extrapolated wrench")
+    adaptive: bool = Field(default=True, description="Lower the order where the wrench is not smooth")
+    acceleration: Acceleration = Field(
+        default="iqn_ils",
+        description="How the iterations of implicit go on: iqn_ils, quasi-Newton; aitken, relaxation",
+    )
+    tolerance: float = quantity(
+        "Difference of guess and answer at which the iterations of implicit end, relative", "1", 1e-8, gt=0.0
+    )
+    iterations: int = Field(default=50, ge=2, le=10000, description="Most exchanges in a step of implicit")
     step: float = quantity("Communication step size, a whole number of nanoseconds", "s", 1e-3, gt=0.0)
     timeout: float = quantity(
         "Wait this long for an answer from a participant that is alive", "s", 2.0, gt=0.0
