@@ -16,7 +16,7 @@ enum { LW_STENCIL = 9 };
 typedef enum {
     LW_PLACED = 0,
     LW_OUTSIDE, /* a marker is in the fringe or beyond the window */
-    LW_OVERLAP  /* markers coincide: no forces give them different velocities */
+    LW_OVERLAP  /* markers of bodies without a joint between them coincide, or nearly so */
 } lw_placement;
 
 typedef struct {
@@ -24,6 +24,7 @@ typedef struct {
     const int32_t *body;  /* (count,2) the bodies that carry a marker; the second is -1, or shares it: a hinge */
     const int32_t *next;  /* (count) marker beside it on the same outline, -1 for none */
     const double *point;  /* (count,2,2) place in the frame of each of the two bodies [cells] */
+    const int32_t *joined; /* (bodies,bodies) whether two bodies may touch, for there is a joint between them */
     /* written by lw_boundary_place */
     double *arm;          /* (count,2,2) from the centre of mass of each body, in world axes [cells] */
     double *at;           /* (count,2) in the window [cells]: the centre of cell (i, j) is at (i, j) */

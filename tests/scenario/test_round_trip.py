@@ -130,11 +130,15 @@ def test_a_path_and_a_name_load_the_same(tmp_path):
 
 def test_builtin_names():
     assert builtin_names() == [
+        "cylinder",
+        "falling_plate",
         "two_link",
         "two_link_field",
         "two_link_flow",
+        "two_link_flow_free",
         "two_link_free",
         "two_link_gust",
+        "vortex_induced_vibration",
     ]
 
 

@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from linkwind.cli import fmu, logs, replay, report, run, scenario, services, verify
+from linkwind.cli import fmu, logs, replay, report, run, scenario, services, validate, verify
 from linkwind.errors import LinkwindError
 
 app = typer.Typer(
@@ -25,6 +25,7 @@ logs.register(app)
 verify.register(app)
 replay.register(app)
 fmu.register(app)
+validate.register(app)
 
 
 @app.callback(invoke_without_command=True)

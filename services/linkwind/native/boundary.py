@@ -20,7 +20,8 @@ from linkwind.spatial import Array, address
 Indices = NDArray[np.int32]
 
 _STENCIL = 9
-_ARRAYS = ("body", "next", "point", "arm", "at", "cell", "weight", "lightness", "velocity", "first", "factor")
+_ARRAYS = ("body", "next", "point", "joined")  # read
+_WRITTEN = ("arm", "at", "cell", "weight", "lightness", "velocity", "first", "factor", "solution")
 
 
 class Placement(enum.IntEnum):
@@ -38,11 +39,13 @@ class Markers(NamedTuple):
         body: the bodies that carry each marker, the second -1 where there is one only, int32, shape (k, 2).
         next: the marker beside it on the same outline, -1 where an open one ends, int32, shape (k,).
         point: its place in the frame of each of the two [cells], from the centre of mass, shape (k, 2, 2).
+        joined: 1 where two bodies may touch, for there is a joint between them, int32, shape (n, n).
     """
 
     body: Indices
     next: Indices
     point: Array
+    joined: Indices
 
 
 class _Boundary(ctypes.Structure):
@@ -51,7 +54,7 @@ class _Boundary(ctypes.Structure):
     _fields_ = [
         ("bodies", ctypes.c_int32),
         ("count", ctypes.c_int32),
-        *((name, ctypes.c_void_p) for name in (*_ARRAYS, "solution")),
+        *((name, ctypes.c_void_p) for name in (*_ARRAYS, *_WRITTEN)),
     ]
 
 
@@ -74,6 +77,7 @@ class Boundary:
             np.ascontiguousarray(markers.body, np.int32),
             np.ascontiguousarray(markers.next, np.int32),
             np.ascontiguousarray(markers.point, np.float64),
+            np.ascontiguousarray(markers.joined, np.int32),
             np.zeros((k, 2, 2)),
             self.at,
             np.zeros((k, 2), np.int32),

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import logging
 import math
+import struct
 
 import numpy as np
 
@@ -27,6 +28,8 @@ from linkwind.scenario import Provider, Scenario
 from linkwind.spatial import Array, Motion, Wrench
 
 _log = logging.getLogger("linkwind")
+
+_MEMORY = struct.Struct("<qqd")  # step that was committed, the last one with a picture, the leak
 
 
 class Flow:
@@ -52,7 +55,8 @@ class Flow:
         acted = grids.bodies(scenario, provider)
         self._acted = acted
         self._bodies = np.array(body_indices(scenario, provider))
-        self._boundary = Boundary(len(acted), markers(acted, list(scenario.joints), self._grid.cell))
+        points = markers(acted, list(scenario.joints), self._grid.cell, self._grid.lattice_viscosity)
+        self._boundary = Boundary(len(acted), points)
         self._interior = Interior(acted, self._grid.density)
         self._reach = np.array([0.5 * body.shape.reference_length for body in acted if body.shape])
         self._lengths = np.array([1.0, 1.0, self._grid.cell])  # of a force, a force, a torque
@@ -66,7 +70,6 @@ class Flow:
         self._fluid: Window | None = None
         self._step, self._shown, self._leak = 0, -1, 0.0
         self._ahead = False  # whether the fluid has gone to the trial state, by several lattice steps
-        self._kept = b""  # the fluid before that
         self.capabilities = Capabilities(
             kind="mean",
             response_size=(6 * len(acted)) ** 2 if self._substeps == 1 else 0,
@@ -99,7 +102,7 @@ class Flow:
         if self._fluid is None:
             self._begin(self._trial)
         elif self._ahead:
-            self._window.restore(self._kept)
+            self._window.back()
             self._ahead = False
         if self._substeps == 1 or t == 0.0:
             force, response = self._one_step(t)
@@ -121,7 +124,13 @@ class Flow:
         if self._fluid is None:
             return b""
         motions = np.hstack([*self._start, *self._accepted]).astype("<f8")
-        return motions.tobytes() + (self._kept if self._ahead else self._fluid.save())
+        memory = _MEMORY.pack(self._step, self._shown, self._leak) + motions.tobytes()
+        if not self._ahead:
+            return memory + self._fluid.save()
+        self._fluid.back()
+        blob = memory + self._fluid.save()
+        self._fluid.back()
+        return blob
 
     def restore(self, blob: bytes) -> None:
         """Take back the fluid that ``save`` returned.
@@ -134,15 +143,22 @@ class Flow:
             self._fluid, self._step, self._substeps = None, 0, self._grid.substeps
             return
         n = len(self._bodies)
-        if len(blob) < 14 * n * 8:
+        if len(blob) < _MEMORY.size + 14 * n * 8:
             raise ProtocolError(f"model flow: expected a checkpoint; got {len(blob)} bytes.")
-        parts = np.split(np.frombuffer(blob, "<f8", 14 * n).reshape(n, 14), [4, 7, 11], axis=1)
+        self._step, self._shown, self._leak = _MEMORY.unpack_from(blob)
+        numbers = np.frombuffer(blob, "<f8", 14 * n, _MEMORY.size).reshape(n, 14)
+        parts = np.split(numbers, [4, 7, 11], axis=1)
         start, accepted = Planar(*parts[:2]), Planar(*parts[2:])
         if self._fluid is None:
             self._begin(start)
         self._start, self._accepted = start, accepted
-        self._window.restore(blob[14 * n * 8 :])
+        self._window.restore(blob[_MEMORY.size + 14 * n * 8 :])
         self._substeps = round(self._h / self._window.step)
+
+    @property
+    def fluid(self) -> Window:
+        """The fluid, as it was committed where a communication step is one lattice step."""
+        return self._window
 
     # ---- one step ----
 
@@ -190,7 +206,7 @@ class Flow:
                 "from each other."
             )
         raise SimulationError(
-            f"{self._item('cells')}: t = {t:.6g} s: expected outlines at least half a cell apart; got "
+            f"{self._item('cells')}: t = {t:.6g} s: expected outlines at least a cell apart; got "
             f"{where} on another. "
             "Bodies that touch need a joint between them, or more cells."
         )
@@ -212,7 +228,8 @@ class Flow:
 
     def _several_steps(self, t: float) -> Array:
         """Step the fluid to the trial state; return the mean force, shape (n, 3)."""
-        self._kept, self._ahead = self._window.save(), True
+        self._window.keep()
+        self._ahead = True
         before, count = t - self._h, self._substeps
         total = np.zeros((len(self._bodies), 3))
         for i in range(1, count + 1):
