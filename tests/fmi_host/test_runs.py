@@ -60,7 +60,7 @@ def test_a_stiff_drag_flies_with_the_derivatives_of_the_fmu(tmp_path):
     code = DRAG.code.replace("-0.5", "-1e5")
     attributes = f'{DRAG.attributes} canGetAndSetFMUstate="true" providesDirectionalDerivative="true"'
     file = fmu(tmp_path, Foreign(DRAG.variables, code=code, attributes=attributes), "stiff")
-    overrides = ["time.end=0.1", "bus.transport=inprocess", "coupling.order=1"]
+    overrides = ["time.end=0.1", "bus.transport=inprocess"]
     scenario, named, _ = load_with("two_link", overrides, [str(file)])
     assert fly(scenario, tmp_path / "with", named).result.force_max_N < 1e4
     scenario, named, _ = load_with(
