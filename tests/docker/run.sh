@@ -40,5 +40,5 @@ if [ -z "${BASE:-}" ]; then
     export BASE=linkwind-base
     tests/docker/base.sh "$BASE"
 fi
-LINKWIND_TEST_DOCKER=1 "${PYTHON:-python3}" -m pytest -q --durations=3 tests/docker "$@"
+LINKWIND_TEST_DOCKER=1 "${PYTHON:-python3}" -m pytest -n 0 -q --durations=3 tests/docker "$@"
 docker image ls linkwind-under-test
