@@ -15,10 +15,12 @@
     │   ├── AnswerTimeoutError           a participant is alive but does not answer
     │   ├── FaultError                   a participant reported that it cannot go on
     │   └── SimulationError              numerical trouble: NaN, singular inertia, step underflow
+    ├── MismatchError                5   what was recorded does not come out again
     └── StoppedError               130   somebody stopped the run: Ctrl-C or SIGTERM
 
 A message says what, which item, expected, got, and what to do. That two runs differ is an answer, not an
-exception: the commands that compare end with exit code 5 (``linkwind.cli.options.DIFFERENT``).
+exception: the commands that compare end with exit code 5 (``linkwind.cli.options.DIFFERENT``). A run that is
+resumed cannot go on from there: a ``MismatchError``, with the same code.
 """
 
 from __future__ import annotations
@@ -80,6 +82,12 @@ class FaultError(ParticipantError):
 
 class SimulationError(ParticipantError):
     """Numerical trouble: not a number, singular inertia, step-size underflow."""
+
+
+class MismatchError(LinkwindError):
+    """A run that is resumed does not do again, bit for bit, what was recorded."""
+
+    exit_code = 5
 
 
 class StoppedError(LinkwindError):

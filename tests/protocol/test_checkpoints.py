@@ -84,7 +84,7 @@ def test_models_that_cannot_save_have_none() -> None:
 
 def test_a_provider_goes_on_from_its_checkpoint() -> None:
     model = Counting()
-    d, p = pair(model, course=Course(checkpoint_every=4, start=4, states={"aero": b"5"}))
+    d, p = pair(model, course=Course(checkpoint_every=4, start=4, states={"aero": (1, b"5")}))
     came = march(d, p, first=5)
     assert came == {5: Checkpoint(4, 4 * STEP_NS, b"5"), 9: Checkpoint(8, 8 * STEP_NS, b"9")}
     times = [t for name, t in model.calls if name == "commit"]
@@ -93,7 +93,7 @@ def test_a_provider_goes_on_from_its_checkpoint() -> None:
 
 
 def test_a_provider_that_goes_on_refuses_another_step() -> None:
-    d, p = pair(Counting(), course=Course(start=4, states={"aero": b"5"}))
+    d, p = pair(Counting(), course=Course(start=4, states={"aero": (1, b"5")}))
     with pytest.raises(ProtocolError, match="expected step 5 iteration 0; got step 6"):
         p.answer(d.post(6, 0))
 
@@ -113,7 +113,7 @@ def test_behind_a_change_the_changed_scenario_counts() -> None:
     for start, built in ((2, 1.0), (3, 1.0), (4, 2.0)):
         names = []
         d = DynamicsSession("r1", "1.0", STEP_NS, STEPS, ["a", "b"], {"aero": ["a", "b"]})
-        d.course = Course(start=start, states={"aero": b"1"}, changes={3: "2.0"})
+        d.course = Course(start=start, states={"aero": (1, b"1")}, changes={3: "2.0"})
         p = ProviderSession("aero", lambda text, name: names.append(text) or Counting(value=float(text)))  # noqa: B023
         p.welcome(d.control(p.hello()))
         p.build()

@@ -6,7 +6,7 @@ import sys
 
 import typer
 
-from linkwind.cli import fmu, logs, replay, report, run, scenario, services, validate, verify
+from linkwind.cli import fmu, logs, replay, report, resume, run, scenario, services, validate, verify
 from linkwind.errors import LinkwindError
 
 app = typer.Typer(
@@ -24,6 +24,7 @@ report.register(app)
 logs.register(app)
 verify.register(app)
 replay.register(app)
+resume.register(app)
 fmu.register(app)
 validate.register(app)
 

@@ -94,12 +94,17 @@ def _show(scenario: Scenario, job: Callable[[Progress], Outcome], *, as_json: bo
     if as_json:
         typer.echo(json.dumps(job(lambda step: None).as_json()))
         return
+    print_summary(behind_a_bar(scenario.name, scenario.steps, job))
+
+
+def behind_a_bar(name: str, steps: int, job: Callable[[Progress], Outcome]) -> Outcome:
+    """Do the job of so many steps behind a progress bar."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     bar = Progress(*columns, console=Console(stderr=True))
-    task = bar.add_task(f"{scenario.name} (steps)", total=scenario.steps)
+    task = bar.add_task(f"{name} (steps)", total=steps)
 
     def progress(step: int) -> None:
         bar.start()  # not before there is something to show
@@ -107,13 +112,14 @@ def _show(scenario: Scenario, job: Callable[[Progress], Outcome], *, as_json: bo
 
     try:
         outcome = job(progress)
-        progress(scenario.steps)
+        progress(steps)
     finally:
         bar.stop()
-    _print_summary(outcome)
+    return outcome
 
 
-def _print_summary(outcome: Outcome) -> None:
+def print_summary(outcome: Outcome) -> None:
+    """Print what a run came to."""
     summary = outcome.as_json()
     exchange, gap = summary["exchange_us"], summary["joint_gap_max_m"]
     rows = {

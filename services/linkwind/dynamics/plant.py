@@ -34,10 +34,15 @@ class MechanismPlant:
 
     def __init__(self, mechanism: Mechanism, scenario: Scenario, where: Callable[[], str]) -> None:
         """Make the plant of ``scenario``; ``where`` tells the step and time of an error."""
-        self.multibody = Multibody(mechanism.tables, mechanism.bodies)
         self._where = where
-        self.initial = State(self.multibody.initial_state(mechanism.q0, mechanism.v0), 0.0, 0.0)
         self._step = scenario.coupling.step_ns / 1e9
+        self.change(mechanism, scenario)
+        self.initial = State(self.multibody.initial_state(mechanism.q0, mechanism.v0), 0.0, 0.0)
+        self._motion = Motion.at_rest(self.multibody.n)
+
+    def change(self, mechanism: Mechanism, scenario: Scenario) -> None:
+        """Go on under the settings of another scenario with the same bodies, joints and steps."""
+        self.multibody = Multibody(mechanism.tables, mechanism.bodies)
         dynamics = scenario.dynamics
         self._how: dict[str, Any] = {
             "integrator": Integrator[dynamics.integrator.upper()],
@@ -45,7 +50,6 @@ class MechanismPlant:
             "rtol": dynamics.rtol,
             "atol": dynamics.atol,
         }
-        self._motion = Motion.at_rest(self.multibody.n)
 
     def advance(self, state: State, nodes: Array, wrenches: Array, added_inertia: Array | None) -> State:
         """Return the state one macro step later; see :class:`linkwind.coupling.Plant`."""
@@ -93,3 +97,19 @@ class MechanismPlant:
 def _later(state: State, values: Array, work: Array) -> State:
     external, dissipated = work.tolist()
     return State(values, state.external_work + external, state.dissipated_work + dissipated)
+
+
+def acceleration_weight(mechanism: Mechanism) -> Array:
+    """Return 1/mass and 1/(mean principal inertia) of the bodies [1/kg, 1/(kg·m²)], shape (n, 6).
+
+    Massless bodies count with the lightest mass that there is.
+    """
+    tables = mechanism.tables
+    mass = tables.mass
+    inertia = tables.inertia[:, :3].mean(axis=1)
+    weight = np.empty((len(mass), 6))
+    for columns, values in ((slice(0, 3), mass), (slice(3, 6), inertia)):
+        positive = values[values > 0.0]
+        floor = positive.min() if len(positive) else 1.0
+        weight[:, columns] = (1.0 / np.maximum(values, floor))[:, None]
+    return weight

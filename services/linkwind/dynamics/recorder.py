@@ -38,6 +38,7 @@ class Recorder:
     Attributes:
         joint_gap_max: largest distance of two joint points so far, from the poses [m].
         force_max: largest aerodynamic force on a body so far [N].
+        multibody: by which points are evaluated.
     """
 
     def __init__(
@@ -52,7 +53,7 @@ class Recorder:
         self.checkpoint = log.checkpoint
         self.diagnostics = log.diagnostics
         self._log = log
-        self._multibody = multibody
+        self.multibody = multibody
         self._step_ns = scenario.coupling.step_ns
         self._state = StateEncoder(n, multibody.nq, multibody.nv)
         self._step = StepEncoder(scenario.coupling.order)
@@ -67,7 +68,7 @@ class Recorder:
 
     def point(self, point: CommunicationPoint) -> None:
         """Write an accepted communication point and what the coupling did to get there."""
-        multibody, values = self._multibody, point.state.values
+        multibody, values = self.multibody, point.state.values
         time_ns = point.step * self._step_ns
         multibody.motion(values, self._accepted)
         result = multibody.evaluate(values, point.wrench, point.added_inertia)
@@ -100,7 +101,7 @@ class Recorder:
 
     def _coupling(self, point: CommunicationPoint, time_ns: int) -> None:
         """Write how far the trial state was from the accepted one, and the power lost between them."""
-        self._multibody.motion(point.trial.values, self._trial)
+        self.multibody.motion(point.trial.values, self._trial)
         difference = self._accepted_twist - self._trial_twist
         np.copyto(self._loads, point.wrench.reshape(-1, 2, 3).swapaxes(0, 1))
         squared = difference.dot(self._twist_inertia * difference)

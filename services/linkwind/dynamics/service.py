@@ -9,21 +9,22 @@ from __future__ import annotations
 import hashlib
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
 from linkwind.bus.base import DynamicsLink
 from linkwind.coupling import SCHEMES, Answer, CommunicationPoint, Settings
-from linkwind.dynamics.plant import MechanismPlant, State
+from linkwind.dynamics.plant import MechanismPlant, State, acceleration_weight
 from linkwind.dynamics.recorder import Recorder
 from linkwind.dynamics.timing import ExchangeTimes
-from linkwind.errors import LostError, StoppedError
-from linkwind.mechanism import Mechanism
+from linkwind.errors import LostError, ScenarioError, StoppedError
+from linkwind.mechanism import Mechanism, build
 from linkwind.protocol import Course, DynamicsSession, fault
 from linkwind.scenario import Scenario
-from linkwind.spatial import Array, Motion
+from linkwind.spatial import Motion
 
 GOODBYE_TIMEOUT = 5.0  # s that a provider may take to commit the last state and say Bye
 
@@ -52,25 +53,50 @@ class Result:
 
 
 class DynamicsService:
-    """One run of a scenario, from the dynamics' side."""
+    """One run of a scenario, from the dynamics' side.
 
-    def __init__(self, scenario: Scenario, mechanism: Mechanism, run: str) -> None:
-        """Build the mechanism and the protocol's state; nothing is sent yet."""
+    Attributes:
+        scenario: at the beginning.
+        session: the protocol's state.
+        mechanism: of the scenario.
+        live_from: the first step whose exchange is timed.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        mechanism: Mechanism,
+        run: str,
+        changes: Mapping[int, Scenario] = MappingProxyType({}),
+    ) -> None:
+        """Build the mechanism and the protocol's state; nothing is sent yet.
+
+        Args:
+            scenario: from the beginning on.
+            mechanism: of the scenario.
+            run: id of the run.
+            changes: scenarios that count after the communication point of a step, by step.
+        """
+        self._changes = {step: (changed, build(changed)) for step, changed in sorted(changes.items())}
+        self._steps = [scenario, *(changed for changed, _ in self._changes.values())][-1].steps
+        self.live_from = 0
         self.session = DynamicsSession(
             run=run,
             scenario_json=scenario.to_json(),
             step_ns=scenario.coupling.step_ns,
-            steps=scenario.steps,
+            steps=self._steps,
             bodies=mechanism.bodies,
             providers={p.name: p.bodies for p in scenario.providers},
         )
-        self.session.course = Course(scenario.log.checkpoint_every)
-        self._scenario = scenario
+        texts = {step: changed.to_json() for step, changed in changes.items()}
+        self.session.course = Course(scenario.log.checkpoint_every, changes=texts)
+        self.scenario = scenario
         self.mechanism = mechanism
         self._plant = MechanismPlant(mechanism, scenario, self.session.where)
         self.multibody = self._plant.multibody
         self._pending: deque[CommunicationPoint] = deque()
         self._times = ExchangeTimes()
+        self._exchanges = 0
 
     def run(
         self,
@@ -110,8 +136,8 @@ class DynamicsService:
             link.fault(fault("dynamics", *self.session.motion.at, error))
             raise
         return Result(
-            steps=self._scenario.steps,
-            exchanges=self._times.count,
+            steps=self._steps,
+            exchanges=self._exchanges,
             wall_s=wall,
             exchange_us=self._times,
             joint_gap_max_m=recorder.joint_gap_max if self.mechanism.has_joints else None,
@@ -120,7 +146,7 @@ class DynamicsService:
         )
 
     def _await_providers(self, poll: Callable[[], None]) -> None:
-        timeout = self._scenario.bus.start_timeout
+        timeout = self.scenario.bus.start_timeout
         if not self._link.wait(lambda: not self.session.not_ready, timeout, poll):
             missing = " and ".join(f'"{name}"' for name in self.session.not_ready)
             raise LostError(
@@ -130,30 +156,52 @@ class DynamicsService:
 
     def _march(self, progress: Callable[[int], None]) -> State:
         """Let the coupling scheme do every step; return the last state."""
-        scenario, mechanism = self._scenario, self.mechanism
+        scenario, mechanism = self.scenario, self.mechanism
         settings = Settings(
             weight=acceleration_weight(mechanism),
             order=scenario.coupling.order,
             adaptive=scenario.coupling.adaptive,
             held=self.session.mean,
+            acceleration=scenario.coupling.acceleration,
+            tolerance=scenario.coupling.tolerance,
+            iterations=scenario.coupling.iterations,
         )
         scheme = SCHEMES[scenario.coupling.scheme]
-        stride = max(1, scenario.steps // 200)
+        if scenario.coupling.scheme == "implicit" and self.session.cannot_go_back:
+            names = " and ".join(f'"{name}"' for name in self.session.cannot_go_back)
+            raise ScenarioError(
+                f"{scenario.source}: coupling.scheme: implicit: expected providers that can go back to the "
+                f"start of a step; got {names}, which cannot. Use pec."
+            )
+        stride = max(1, self._steps // 200)
         state = self._plant.initial
-        for point in scheme(self._plant, self._exchange, state, scenario.steps, settings):
+        for point in scheme(self._plant, self._exchange, state, self._steps, settings):
             self._pending.append(point)  # written while the next answer is awaited
             state = point.state
             if point.step % stride == 0:
                 progress(point.step)
+            if point.step in self._changes:
+                self._change(point.step, *self._changes[point.step])
         return state
+
+    def _change(self, step: int, scenario: Scenario, mechanism: Mechanism) -> None:
+        """Go on under other settings after a communication point that is final."""
+        last = self.session.motion.at[0]
+        if last != step:
+            raise ScenarioError(
+                f"step {step}: expected a point behind the start of {scenario.coupling.scheme}; got one of "
+                f"the first {last + 1}, which are computed together. Change at step {last} or later."
+            )
+        self._write_pending()
+        self._plant.change(mechanism, scenario)
+        self.multibody = self._recorder.multibody = self._plant.multibody
 
     def _exchange(self, step: int, iteration: int, accepted: State, trial: State) -> Answer:
         """Post both states, write the log, return the sum of the providers' answers."""
         session, link, motion = self.session, self._link, self.session.motion
         self._plant.multibody.motion(accepted.values, motion.accepted)
         self._plant.multibody.motion(trial.values, motion.trial)
-        payload = session.post(step, iteration)
-        start = time.perf_counter_ns()
+        start, payload = time.perf_counter_ns(), session.post(step, iteration)
         link.post(payload)
         self._write_pending()
         self._recorder.motion(payload, motion.time_ns)
@@ -162,7 +210,9 @@ class DynamicsService:
             if session.accept(provider, answer):
                 self._recorder.wrench(provider, answer, motion.time_ns)
         took = time.perf_counter_ns() - start
-        self._times.add(took)
+        self._exchanges += 1
+        if step >= self.live_from:
+            self._times.add(took)
         self._recorder.timing(step, motion.time_ns, took)
         self._take_shown()
         return Answer(*session.total())
@@ -183,7 +233,7 @@ class DynamicsService:
         motion = self.session.motion
         self._plant.multibody.motion(final.values, motion.accepted)
         self._plant.multibody.motion(final.values, motion.trial)
-        payload = self.session.post(self._scenario.steps, 0, final=True)
+        payload = self.session.post(self._steps, 0, final=True)
         self._link.post(payload)
         self._write_pending()
         self._recorder.motion(payload, motion.time_ns)
@@ -198,19 +248,3 @@ class DynamicsService:
         self._plant.multibody.motion(final.values, motion)
         parts = [motion.position, motion.orientation, motion.linear, motion.angular]
         return hashlib.sha256(np.hstack(parts).astype("<f8").tobytes()).hexdigest()
-
-
-def acceleration_weight(mechanism: Mechanism) -> Array:
-    """Return 1/mass and 1/(mean principal inertia) of the bodies [1/kg, 1/(kg·m²)], shape (n, 6).
-
-    Massless bodies count with the lightest mass that there is.
-    """
-    tables = mechanism.tables
-    mass = tables.mass
-    inertia = tables.inertia[:, :3].mean(axis=1)
-    weight = np.empty((len(mass), 6))
-    for columns, values in ((slice(0, 3), mass), (slice(3, 6), inertia)):
-        positive = values[values > 0.0]
-        floor = positive.min() if len(positive) else 1.0
-        weight[:, columns] = (1.0 / np.maximum(values, floor))[:, None]
-    return weight

@@ -24,6 +24,8 @@ class ExchangeTimes:
         self._bins[int(math.log(min(max(ns, 1), LONGEST_NS)) * self._scale)] += 1
 
     def quantile_us(self, q: float) -> float:
-        """Return the time [µs] that a share ``q`` of the exchanges stayed below, to 0.5 %."""
+        """Return the time [µs] that a share ``q`` of the exchanges stayed below, to 0.5 %; 0 without any."""
+        if self.count == 0:
+            return 0.0
         place = int(np.searchsorted(np.cumsum(self._bins), q * self.count))
         return math.exp((place + 0.5) / self._scale) / 1e3

@@ -119,6 +119,12 @@ class Log:
         return self._known(None if scenario is None else scenario.decode(), "the scenario")
 
     @property
+    def changes(self) -> dict[int, str]:
+        """Scenarios that a resumed run went on with, by the step after which each counts."""
+        changes = json.loads(self.metadata.get("changes", "{}"))
+        return {int(step): text for step, text in changes.items()}
+
+    @property
     def bodies(self) -> tuple[str, ...]:
         """Bodies in the order of the messages."""
         return tuple(json.loads(self._known(self.metadata.get("bodies"), "the list of bodies")))

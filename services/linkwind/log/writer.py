@@ -33,12 +33,9 @@ CHUNK_SIZE = 256 * 1024  # bytes; a chunk is what a damaged byte makes unreadabl
 
 
 class LogWriter:
-    """One log file, from the start of a run to its end.
-
-    Used in a ``with`` statement, an exception that leaves the block is recorded as the end of the run::
+    """One log file, from the start of a run to its end; an exception that leaves the block is recorded::
 
         with LogWriter(path, run=run, ...) as log:
-            log.motion(payload, time_ns)
             ...
             log.close(final_state_sha256=digest)
 
@@ -123,7 +120,7 @@ class LogWriter:
         self._transforms = FrameTransformsChannel(contents.TRANSFORMS, context=self._context)
         self._scenes = SceneUpdateChannel(contents.SCENE, context=self._context)
         self._opened += [self._transforms, self._scenes]
-        self._rare: dict[str, Callable[[bytes, int], None]] = {}  # opened when there is a message
+        self._rare = {contents.TIMING: self._timing}  # the others are opened when there is a message
 
     def _channel(self, topic: str, kind: Schema | None = None) -> Callable[[bytes, int], None]:
         """Open a channel; return its method that logs a payload at a time, without the layers above.
@@ -179,15 +176,18 @@ class LogWriter:
 
     def frame(self, provider: str, frame: FlowFrame) -> None:
         """Log a frame of the fluid that ``provider`` showed, at the frame's own time."""
-        self._seldom(contents.FLOW + provider, Grid.get_schema())(grid.encode(frame), frame.time_ns)
+        self.copy(contents.FLOW + provider, grid.encode(frame), frame.time_ns)
 
     def checkpoint(self, provider: str, payload: bytes, time_ns: int) -> None:
         """Log an encoded Checkpoint of ``provider``, at the checkpoint's own time."""
-        self._seldom(contents.CHECKPOINT + provider)(payload, time_ns)
+        self.copy(contents.CHECKPOINT + provider, payload, time_ns)
 
-    def _seldom(self, topic: str, kind: Schema | None = None) -> Callable[[bytes, int], None]:
-        self._rare[topic] = self._rare.get(topic) or self._channel(topic, kind)
-        return self._rare[topic]
+    def copy(self, topic: str, payload: bytes, time_ns: int) -> None:
+        """Log a timing, a frame or a checkpoint as another log has it."""
+        if topic not in self._rare:
+            kind = Grid.get_schema() if topic.startswith(contents.FLOW) else None
+            self._rare[topic] = self._channel(topic, kind)
+        self._rare[topic](payload, time_ns)
 
     def diagnostics(self, names: Mapping[str, Sequence[str]]) -> None:
         """Record the names of the numbers that providers report with their wrenches; none, nothing."""

@@ -48,13 +48,13 @@ class Course:
     Attributes:
         checkpoint_every: steps from one checkpoint to the next; 0 for none.
         start: the step that the providers begin after, with ``states``; -1 for the beginning.
-        states: what each provider had saved then.
+        states: what each provider had saved then, and the number of that checkpoint.
         changes: scenarios (JSON) that count from the motion of step + 1 on, by step.
     """
 
     checkpoint_every: int = 0
     start: int = -1
-    states: Mapping[str, bytes] = field(default_factory=dict)
+    states: Mapping[str, tuple[int, bytes]] = field(default_factory=dict)
     changes: Mapping[int, str] = field(default_factory=dict)
 
 
@@ -142,7 +142,9 @@ class HandShake:
         changes = [{"step": step, "scenario_json": text} for step, text in sorted(course.changes.items())]
         body: dict[str, Any] = {"checkpoint_every": course.checkpoint_every, "changes": changes}
         if course.start >= 0:
-            body["resume"] = {"step": course.start, "state": course.states[provider]}
+            number, state = course.states[provider]
+            body["resume"] = {"step": course.start, "state": state, "number": number}
+            self.participants[provider].checkpoints = number - 1
         return body
 
     def _on_ready(self, message: Any) -> Any:

@@ -47,6 +47,7 @@ class Memory:
     Attributes:
         start: step that was committed when the run was cut; -1 for a run from the beginning.
         model: that counts now.
+        saved: checkpoints so far.
     """
 
     def __init__(self, welcome: Any, name: str, build: Callable[[str, str], Model]) -> None:
@@ -71,7 +72,7 @@ class Memory:
                 self.close()
                 raise
         self._checkpoints: list[bytes] = []
-        self.saved = 0
+        self.saved = 0 if resume is None else int(resume.number) - 1
 
     def committed(self, step: int, time_ns: int) -> None:
         """Do what is due after the commit of ``step``: save the memory, then change the scenario."""

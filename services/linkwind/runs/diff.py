@@ -17,7 +17,7 @@ from linkwind.log.contents import FLOW, MOTION, STATE, STEP, WRENCH
 from linkwind.log.difference import Difference, printable
 from linkwind.log.reader import Log, open_log
 from linkwind.mechanism import build
-from linkwind.runs.verify import finder
+from linkwind.runs.comparison import finder
 from linkwind.scenario import from_json
 
 INTERVALS = 8  # of time, into which the growth is divided

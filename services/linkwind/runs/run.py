@@ -12,7 +12,7 @@ from typing import Any
 
 from linkwind import aero
 from linkwind.bus.base import DynamicsLink
-from linkwind.dynamics.recorder import Recorder, tables_sha256
+from linkwind.dynamics.recorder import MessageLog, Recorder, tables_sha256
 from linkwind.dynamics.service import DynamicsService, Result
 from linkwind.errors import InputError, LinkwindError, ScenarioError
 from linkwind.log.writer import LogWriter
@@ -66,6 +66,15 @@ class Outcome:
 Progress = Callable[[int], None]
 
 
+@dataclass(frozen=True)
+class Beginning:
+    """What a run that goes on from a log puts in front of the bus and of the new log; the log says so."""
+
+    link: Callable[[DynamicsLink], DynamicsLink]
+    log: Callable[[LogWriter], MessageLog]
+    metadata: Mapping[str, str]
+
+
 def run(
     scenario: Scenario,
     out: Path | None,
@@ -87,8 +96,20 @@ def run(
     aero.check(scenario)
     folder = folders.create(scenario.name, out)
     service = DynamicsService(scenario, mechanism, folders.run_id(folder))
+    return with_providers(service, folder, progress, files)
+
+
+def with_providers(
+    service: DynamicsService,
+    folder: Path,
+    progress: Progress,
+    files: Mapping[str, Path],
+    beginning: Beginning | None = None,
+) -> Outcome:
+    """Run a service with every provider on this machine; see :func:`run`."""
+    scenario = service.scenario
     if scenario.bus.transport == "inprocess":
-        return _drive(scenario, service, folder, progress, _inprocess(service, files), lambda: None)
+        return _drive(service, folder, progress, _inprocess(service, files), lambda: None, beginning)
     link, endpoint = _listen_here(service, scenario)
     with children(folder) as providers:
         for name in service.session.providers:
@@ -96,7 +117,7 @@ def run(
             if name in files:
                 arguments += ["--force-fmu", str(files[name].resolve())]
             providers.start(name, [*arguments, "--start-timeout", str(scenario.bus.start_timeout)])
-        return _drive(scenario, service, folder, progress, link, providers.check)
+        return _drive(service, folder, progress, link, providers.check, beginning)
 
 
 def dynamics(
@@ -127,23 +148,25 @@ def dynamics(
     except InputError:
         folder.rmdir()
         raise
-    return _drive(scenario, service, folder, progress, link, lambda: None)
+    return _drive(service, folder, progress, link, lambda: None)
 
 
 def _drive(
-    scenario: Scenario,
     service: DynamicsService,
     folder: Path,
     progress: Progress,
     link: DynamicsLink,
     poll: Callable[[], None],
+    beginning: Beginning | None = None,
 ) -> Outcome:
     """Run the service, close the log with how it ended, write the report either way."""
-    log, report = folder / "log.mcap", folder / "report.html"
+    log, report, scenario = folder / "log.mcap", folder / "report.html", service.scenario
+    metadata = beginning.metadata if beginning else {}
     try:
-        with terminate_as_interrupt(), closing(link), _open_log(log, scenario, service) as writer:
-            recorder = Recorder(writer, scenario, service.mechanism, service.multibody)
-            result = service.run(link, recorder, progress, poll)
+        with terminate_as_interrupt(), closing(link), _open_log(log, service, metadata) as writer:
+            messages = beginning.log(writer) if beginning else writer
+            recorder = Recorder(messages, scenario, service.mechanism, service.multibody)
+            result = service.run(beginning.link(link) if beginning else link, recorder, progress, poll)
             writer.close(final_state_sha256=result.final_state_sha256)
     except LinkwindError as error:
         if not log.exists():
@@ -176,16 +199,17 @@ def _listen_here(service: DynamicsService, scenario: Scenario) -> tuple[Dynamics
     raise taken
 
 
-def _open_log(path: Path, scenario: Scenario, service: DynamicsService) -> LogWriter:
+def _open_log(path: Path, service: DynamicsService, metadata: Mapping[str, str]) -> LogWriter:
     return LogWriter(
         path,
         run=service.session.run,
-        scenario_json=scenario.to_json(),
+        scenario_json=service.scenario.to_json(),
         body_names=service.mechanism.bodies,
         provider_bodies=service.session.providers,
         metadata={
             "tables_sha256": tables_sha256(service.mechanism),
             "library_sha256": library_sha256(),
+            **metadata,
         },
     )
 

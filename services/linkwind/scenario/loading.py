@@ -75,8 +75,8 @@ def loads(text: str, name: str, overrides: Sequence[str] = ()) -> Scenario:
     return scenario
 
 
-def from_json(text: str, name: str = "scenario.json") -> Scenario:
-    """Return the scenario that ``Scenario.to_json`` wrote, equal to the original.
+def from_json(text: str, name: str = "scenario.json", overrides: Sequence[str] = ()) -> Scenario:
+    """Return the scenario that ``Scenario.to_json`` wrote, equal to the original without ``overrides``.
 
     Raises:
         ScenarioError: this is not JSON, or something in it is wrong; one line a problem.
@@ -87,7 +87,7 @@ def from_json(text: str, name: str = "scenario.json") -> Scenario:
         raise ScenarioError(f"{name}: expected valid JSON; got: {_flat(error)}. Correct it.") from None
     if not isinstance(data, dict):
         raise ScenarioError(f"{name}: expected an object; got {type(data).__name__}. Correct it.")
-    return _scenario(data, name, ())
+    return _scenario(data, name, overrides)
 
 
 def template() -> str:
