@@ -15,13 +15,15 @@ import struct
 
 import numpy as np
 
-from linkwind.aero.base import Capabilities, body_indices, item
+from linkwind.aero.base import Capabilities, body_indices
 from linkwind.aero.flow import grid as grids
 from linkwind.aero.flow.interior import Interior
 from linkwind.aero.flow.motion import Planar, between, planar
 from linkwind.aero.flow.outline import markers
+from linkwind.aero.flow.refusals import Refusals
+from linkwind.aero.flow.start import SmoothStart
 from linkwind.aero.flow.window import Window
-from linkwind.errors import ProtocolError, SimulationError
+from linkwind.errors import ProtocolError
 from linkwind.frames import FlowFrame
 from linkwind.native.boundary import Boundary, Placement
 from linkwind.scenario import Provider, Scenario
@@ -52,6 +54,7 @@ class Flow:
         """
         self._scenario, self._provider = scenario, provider
         self._grid = grids.plan(scenario, provider)
+        self._refuse = Refusals(scenario, provider)
         acted = grids.bodies(scenario, provider)
         self._acted = acted
         self._bodies = np.array(body_indices(scenario, provider))
@@ -124,7 +127,8 @@ class Flow:
         if self._fluid is None:
             return b""
         motions = np.hstack([*self._start, *self._accepted]).astype("<f8")
-        memory = _MEMORY.pack(self._step, self._shown, self._leak) + motions.tobytes()
+        leak = self._leak if self._substeps == 1 else 0.0  # else it belongs to the trial
+        memory = _MEMORY.pack(self._step, self._shown, leak) + motions.tobytes()
         if not self._ahead:
             return memory + self._fluid.save()
         self._fluid.back()
@@ -151,7 +155,8 @@ class Flow:
         start, accepted = Planar(*parts[:2]), Planar(*parts[2:])
         if self._fluid is None:
             self._begin(start)
-        self._start, self._accepted = start, accepted
+        self._set_out(start)
+        self._accepted = accepted
         self._window.restore(blob[_MEMORY.size + 14 * n * 8 :])
         self._substeps = round(self._h / self._window.step)
 
@@ -173,43 +178,26 @@ class Flow:
         centres = start.pose[:, :2]
         size = grids.window(self._scenario, self._provider, self._grid, centres)
         self._fluid = Window(self._grid, size, centres.mean(axis=0), self._provider.flow.threads)
-        self._start = self._accepted = start
+        self._set_out(start)
+        self._accepted = start
         self._keep_slow(start)
-        self._start_time = _start_time(self._scenario, self._provider, self._grid.length)
         _log.info(
             '"%s": %d × %d cells of %.4g m, %.4g s a lattice step, %d in a communication step; %d markers',
             self._provider.name, *size, self._grid.cell, self._grid.step, self._substeps,
             len(self._boundary.markers.body),
         )  # fmt: skip
 
-    def _wall(self, t: float, twist: Array) -> Array:
-        """Return the twists that the fluid is given: at first those of the stream, so that the start is "
-        "smooth."""
-        s = min(1.0, t / self._start_time) if self._start_time else 1.0
-        if s == 1.0:
-            return twist
-        left = 1.0 - s * s * (3.0 - 2.0 * s)
-        return twist + left * (np.array([*self._grid.wind, 0.0]) - self._start.twist)
+    def _set_out(self, start: Planar) -> None:
+        self._start = start
+        self._wall = SmoothStart(self._scenario, self._provider, self._grid.length, start.twist)
 
     def _place(self, t: float, at: Planar) -> None:
         placement, marker = self._window.place(self._boundary, at.pose)
         if placement == Placement.PLACED:
             return
         names = [self._acted[i].name for i in self._boundary.markers.body[marker] if i >= 0]
-        where = " and ".join(f'"{name}"' for name in names)
-        if placement == Placement.OUTSIDE:
-            raise SimulationError(
-                f"{self._item('window')}: t = {t:.6g} s: expected every body inside the window, "
-                f"{grids.FRINGE + 2} cells "
-                f"from its border; got {where} outside. Make the window larger: bodies drift apart, or "
-                f"start far "
-                "from each other."
-            )
-        raise SimulationError(
-            f"{self._item('cells')}: t = {t:.6g} s: expected outlines at least a cell apart; got "
-            f"{where} on another. "
-            "Bodies that touch need a joint between them, or more cells."
-        )
+        outside = placement == Placement.OUTSIDE
+        raise self._refuse.outside(t, names) if outside else self._refuse.overlap(t, names)
 
     def _one_step(self, t: float) -> tuple[Array, Array]:
         """Return what the markers ask for: force in N and N·m, shape (n, 3), and G, shape (3n, 3n)."""
@@ -262,23 +250,14 @@ class Flow:
         fastest = at.fastest(self._reach)
         while fastest / self._window.speed > grids.MAX_SPEED:
             if not math.isfinite(fastest) or self._substeps >= grids.MAX_SUBSTEPS:
-                raise SimulationError(
-                    f"{self._item('cells')}: expected bodies of at most {grids.MAX_SUBSTEPS} lattice steps "
-                    f"of "
-                    f"{grids.MAX_SPEED} cells in a communication step; got {fastest:.4g} m/s. Has the motion "
-                    "diverged? Try a smaller coupling.step."
-                )
+                raise self._refuse.too_fast(fastest)
             self._shorten(fastest)
 
     def _shorten(self, fastest: float) -> None:
         light = [body.name for body in self._acted if body.mass < self._grid.density * self._grid.length**2]
         if self._substeps == 1 and light:
             limit = grids.MAX_SPEED * self._window.speed
-            raise SimulationError(
-                f"{self._scenario.source}: coupling.step: expected bodies below {grids.MAX_SPEED} cells "
-                f'a step, {limit:.4g} m/s, because "{light[0]}" is light and needs the response of a single '
-                f"lattice step; got {fastest:.4g} m/s. Use at most {0.5 * self._h:.3g} s."
-            )
+            raise self._refuse.too_fast_for_light(light[0], fastest, limit)
         self._window.halve(self._grid.viscosity)
         self._substeps *= 2
         _log.info(
@@ -288,10 +267,7 @@ class Flow:
 
     def _write(self, t: float, force: Array, response: Array, wrench: Wrench) -> None:
         if not np.isfinite(force).all():
-            raise SimulationError(
-                f"{self._item('cells')}: expected a finite force at t = {t:.6g} s; got {force.tolist()}: "
-                "the fluid is unstable. Use a smaller coupling.step, more cells, or a longer start_time."
-            )
+            raise self._refuse.unstable(t, force)
         wrench.force.fill(0.0)
         wrench.torque.fill(0.0)
         wrench.force[:, :2], wrench.torque[:, 2] = force[:, :2], force[:, 2]
@@ -306,14 +282,3 @@ class Flow:
                 speed * self._grid.cell / self._grid.viscosity,
                 self._substeps,
             )
-
-    def _item(self, key: str) -> str:
-        return item(self._scenario, self._provider, "flow", key)
-
-
-def _start_time(scenario: Scenario, provider: Provider, length: float) -> float:
-    """Return the time in which the wind comes up [s]."""
-    wind = math.hypot(*scenario.environment.wind[:2])
-    if provider.flow.start_time is not None:
-        return provider.flow.start_time
-    return length / wind if wind else 0.0
