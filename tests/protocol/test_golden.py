@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import base64
+import hashlib
 import json
 import runpy
 from pathlib import Path
@@ -44,11 +45,31 @@ def vectors() -> dict[str, tuple[str, dict[str, Any]]]:
         "wrench": ("WrenchStep", {**wrench, **loads}),
         "wrench_added_inertia": ("WrenchStep", {**wrench, **loads, "addedInertia": numbers(72, 0.3)}),
         "flow_frame": ("FlowFrame", flow_frame()),
+        "checkpoint": ("Checkpoint", checkpoint()),
+        "welcome_resume": ("Control", {"welcome": welcome()}),
         "hello": (
             "Control",
             {"hello": {"name": "aero", "schemaSha256": "00", "version": "0.1.0", "instance": "i"}},
         ),
     }
+
+
+def checkpoint() -> dict[str, Any]:
+    """Four bytes of memory; bytes are base64 in JSON."""
+    state = bytes([0, 1, 128, 255])
+    content = {"state": state, "sha256": hashlib.sha256(state).digest()}
+    when = {"run": "golden", "provider": "aero", "number": "3", "step": "120", "timeNs": "120000000"}
+    return when | {name: base64.b64encode(value).decode() for name, value in content.items()}
+
+
+def welcome() -> dict[str, Any]:
+    """A run that goes on after step 120, and changes after step 500."""
+    return {
+        "run": "golden", "scenarioJson": "{}", "stepNs": "1000000", "steps": "1200",
+        "bodies": ["link1", "link2"], "providerBodies": ["link2"], "checkpointEvery": "40",
+        "resume": {"step": "120", "state": checkpoint()["state"], "number": "3"},
+        "changes": [{"step": "500", "scenarioJson": "{}"}],
+    }  # fmt: skip
 
 
 def flow_frame() -> dict[str, Any]:

@@ -102,6 +102,17 @@ def test_from_every_checkpoint_and_beside_it(name: str, tmp_path: Path) -> None:
         check_same(done, whole)
 
 
+def test_cut_between_two_coupling_iterations(tmp_path: Path) -> None:
+    whole = fly("two_link", tmp_path / "whole", "coupling.scheme=implicit")
+    motions = exchange_ends(whole.log)
+    assert len(motions) > 2 * STEPS
+    for number in (2, 3, 4, 5, 47, 48, 49, 50, len(motions) - 2):
+        log = cut(whole.log, tmp_path / f"{number}.mcap", motions[number] + 1)
+        check_same(go_on(log, tmp_path / str(number)), whole)
+    for step in (0, 1, 10, 17):
+        check_same(go_on(whole.log, tmp_path / f"step-{step}", step), whole)
+
+
 @pytest.mark.parametrize("step", [7, 20, 25])
 def test_over_zenoh(step: int, tmp_path: Path) -> None:
     whole = fly("two_link_field", tmp_path / "whole", "bus.transport=zenoh")
@@ -285,6 +296,9 @@ def test_the_new_log_says_where_it_comes_from(tmp_path: Path) -> None:
     assert log.run == "whole"
     assert (log.metadata["resumed_run"], log.metadata["resumed_step"]) == ("whole", "25")
     assert list(log.changes) == [25]
+    done = CliRunner().invoke(app, ["log", "info", str(log.path)])
+    assert "resumed  after step 25" in done.stdout
+    assert "after step 25  other settings" in done.stdout
     assert json.loads(log.scenario_json)["environment"]["gravity"] == [0.0, -9.81, 0.0]
 
 

@@ -47,6 +47,8 @@ def info(log: LogArgument, as_json: JsonOption = False) -> None:
         "scenario": about["scenario"],
         "steps": about["steps"],
         "complete": ending,
+        **({"resumed": f"after step {resumed}"} if (resumed := opened.metadata.get("resumed_step")) else {}),
+        **{f"  after step {step}": "other settings" for step in opened.changes},
         "final state": opened.final_state_sha256 or "none",
         "messages": about["messages"],
         **{f"  {topic}": count for topic, count in about["topics"].items()},

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from linkwind.log.reader import Log
     from linkwind.runs.diff import Compared, Growth
     from linkwind.runs.verify import Verified
-    from linkwind.scenario import Scenario
 
 
 def register(app: typer.Typer) -> None:
@@ -40,10 +39,11 @@ def verify(
 
     Example: linkwind verify runs/two_link-20260101-120000/log.mcap
     """
-    from linkwind.runs.verify import scenario_of
+    from linkwind.runs.verify import changes_of, scenario_of
     from linkwind.runs.verify import verify as verify_log
 
     opened, scenario = scenario_of(log)
+    steps = [scenario, *changes_of(opened).values()][-1].steps
     files: dict[str, Path] = {}
     if not from_recorded_wrenches:
         files = files_by_provider(scenario, force_fmu or [])
@@ -52,7 +52,7 @@ def verify(
     def job(progress: Callable[[int], None]) -> Verified:
         return verify_log(opened, scenario, progress, files, from_recorded_wrenches=from_recorded_wrenches)
 
-    found = job(lambda step: None) if as_json else _behind_a_bar(scenario, job)
+    found = job(lambda step: None) if as_json else _behind_a_bar(scenario.name, steps, job)
     if as_json:
         first = found.difference.as_json() | {"changed": found.changed} if found.difference else None
         typer.echo(
@@ -61,21 +61,21 @@ def verify(
         if found.remark:
             typer.echo(f"note: {found.remark}", err=True)
     else:
-        _show(opened, scenario, found)
+        _show(opened, steps, found)
     if not found.identical:
         raise typer.Exit(DIFFERENT)
 
 
-def _behind_a_bar(scenario: Scenario, job: Callable[[Callable[[int], None]], Verified]) -> Verified:
+def _behind_a_bar(name: str, steps: int, job: Callable[[Callable[[int], None]], Verified]) -> Verified:
     from rich.console import Console
     from rich.progress import Progress
 
     with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(f"{scenario.name} (steps)", total=scenario.steps)
+        task = bar.add_task(f"{name} (steps)", total=steps)
         return job(lambda step: bar.update(task, completed=step))
 
 
-def _show(log: Log, scenario: Scenario, found: Verified) -> None:
+def _show(log: Log, steps: int, found: Verified) -> None:
     if found.difference is not None:
         typer.echo("different: the first difference is")
         rows(found.difference.lines("recorded", "again"))
@@ -85,7 +85,7 @@ def _show(log: Log, scenario: Scenario, found: Verified) -> None:
         else:
             typer.echo("versions, processor and library are those that made the log")
     else:
-        extent = f"{found.steps} of {scenario.steps} steps, {found.messages} messages"
+        extent = f"{found.steps} of {steps} steps, {found.messages} messages"
         typer.echo(f"identical: {extent}, every bit of them")
         if found.changed:
             typer.echo(f"though made with another {', '.join(found.changed)}")

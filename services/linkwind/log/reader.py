@@ -122,7 +122,7 @@ class Log:
     def changes(self) -> dict[int, str]:
         """Scenarios that a resumed run went on with, by the step after which each counts."""
         changes = json.loads(self.metadata.get("changes", "{}"))
-        return {int(step): text for step, text in changes.items()}
+        return {step: changes[str(step)] for step in sorted(map(int, changes))}
 
     @property
     def bodies(self) -> tuple[str, ...]:

@@ -10,6 +10,8 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 
+from google.protobuf.message import DecodeError
+
 from linkwind.bus.base import DynamicsLink
 from linkwind.errors import MismatchError
 from linkwind.frames import FlowFrame
@@ -89,7 +91,10 @@ class SplicedLink:
 
     def _is_answer(self, payload: bytes) -> bool:
         """Tell whether a wrench is the answer to the last motion rather than a late one to another."""
-        message = MESSAGES["WrenchStep"].FromString(payload)
+        try:
+            message = MESSAGES["WrenchStep"].FromString(payload)
+        except DecodeError:
+            return True
         return (message.step, message.iteration) == self._session.motion.at
 
 

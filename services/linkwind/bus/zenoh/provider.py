@@ -13,6 +13,8 @@ from linkwind.bus.zenoh.endpoint import Endpoint
 from linkwind.bus.zenoh.session import LEASE, key_segment
 from linkwind.errors import LostError, ParticipantError
 
+ANSWER = 5.0  # s for the answer to a request: a Welcome may carry the memory of a large model
+
 
 class ZenohProviderLink(Endpoint):
     """A provider's end."""
@@ -35,7 +37,7 @@ class ZenohProviderLink(Endpoint):
         """Send a control request and return the answer; see :class:`~linkwind.bus.base.ProviderLink`."""
         end = time.monotonic() + timeout
         while time.monotonic() < end:
-            replies = [r for r in self._ask(payload, min(1.0, timeout)) if r.ok is not None]
+            replies = [r for r in self._ask(payload, min(ANSWER, timeout)) if r.ok is not None]
             if len(replies) > 1:
                 runs = ", ".join(sorted(str(r.ok.key_expr).split("/")[2] for r in replies))
                 raise ParticipantError(f"expected one dynamics; got runs {runs}. Choose one with --run")
