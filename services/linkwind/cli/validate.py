@@ -73,11 +73,11 @@ def _run(short: bool, chosen: tuple[str, ...]) -> tuple[list[Row], list[Plot]]:
 
     from linkwind.runs import validate
 
-    names = chosen or tuple(validate.FLOW)
+    names = [name for name in chosen or validate.FLOW if not (short and name in validate.LONG)]
     rows: list[Row] = []
     plots: list[Plot] = []
     with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(names[0], total=len(names))
+        task = bar.add_task(next(iter(names), ""), total=len(names))
         for done, (_, found) in enumerate(validate.flow(short, chosen), start=1):
             rows += found.rows
             plots += found.plots

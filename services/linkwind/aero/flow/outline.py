@@ -19,7 +19,7 @@ from linkwind.spatial import Array
 
 SPACING = 1.1  # cells from marker to marker: with 2 the fluid leaks, below 1 the forces alternate
 PLATE_INSET = (1.1, 0.60, 0.42, 2.8)  # cells by which a free edge of a plate is drawn in, see `inset`
-OUTLINE_INSET = (0.3, 0.14, 0.21, 1.08)  # cells by which a closed outline is drawn in
+OUTLINE_INSET = (0.35, -0.1, 0.28, 1.08)  # cells by which a closed outline is drawn in
 CROSSED = 0.05  # cells nearer to the outline than it was moved by: a point on the wrong side of a tip
 AT_END = 0.5  # cells within which a joint's point counts as the end of a plate
 

@@ -18,7 +18,9 @@ FLOW: dict[str, Callable[[bool], Findings]] = {
     **free.CASES,
 }
 
-__all__ = ["FLOW", "Curve", "Findings", "Plot", "Row", "flow"]
+LONG = ("plate normal to a stream", "falling plate")  # cases without a short form
+
+__all__ = ["FLOW", "LONG", "Curve", "Findings", "Plot", "Row", "flow"]
 
 
 def flow(short: bool, chosen: tuple[str, ...] = ()) -> Iterator[tuple[str, Findings]]:
@@ -29,5 +31,5 @@ def flow(short: bool, chosen: tuple[str, ...] = ()) -> Iterator[tuple[str, Findi
         chosen: names of cases; all if empty.
     """
     for name, case in FLOW.items():
-        if not chosen or name in chosen:
+        if name in (chosen or FLOW) and not (short and name in LONG):
             yield name, case(short)

@@ -112,7 +112,7 @@ def impulse(short: bool) -> Findings:
 
 def galilean(short: bool) -> Findings:
     """A cylinder in a stream against one that moves through a fluid at rest with the window."""
-    cells, end = (20, 5.0) if short else (32, 8.0)
+    cells, end = (20, 4.0) if short else (32, 8.0)
     speed = np.array([0.8, 0.6])
     histories = []
     for moving in (False, True):
@@ -124,6 +124,7 @@ def galilean(short: bool) -> Findings:
             viscosity=0.01,
             window=(20.0, 20.0),
             wind=wind,
+            start_time=1.0,
         )
         driven = Driven(text)
         twist = np.array([*-speed, 0.0]) if moving else np.zeros(3)

@@ -22,13 +22,14 @@ ADDED_INERTIA = np.pi / 128.0
 
 def normal(short: bool) -> Findings:
     """Mean drag and Strouhal number of a plate normal to a stream, Re 100."""
-    cells, end, width = (20, 90.0, 26.0) if short else (40, 120.0, 40.0)
+    del short
+    cells, end, window = 32, 90.0, (36.0, 30.0)
     text = scene(
         PLATE,
         cells=cells,
-        step=communication_step(0.06, cells),
+        step=communication_step(0.08, cells),
         viscosity=0.01,
-        window=(width, 0.75 * width),
+        window=window,
         wind=(1.0, 0.0),
         start_time=1.0,
     )
