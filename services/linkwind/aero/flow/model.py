@@ -258,7 +258,10 @@ class Flow:
         if self._substeps == 1 and light:
             limit = grids.MAX_SPEED * self._window.speed
             raise self._refuse.too_fast_for_light(light[0], fastest, limit)
-        self._window.halve(self._grid.viscosity)
+        try:
+            self._window.halve(self._grid.viscosity)
+        except ValueError as error:
+            raise self._refuse.too_fast(fastest) from error  # its viscosity is too small for a float
         self._substeps *= 2
         _log.info(
             '"%s": a body goes %.4g m/s: %d lattice steps in a communication step from now on',
