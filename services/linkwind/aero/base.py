@@ -61,10 +61,18 @@ class ForceModel(Protocol):
         """
 
     def save(self) -> bytes:
-        """Return all memory as an opaque blob."""
+        """Return all memory as an opaque blob; called after a ``commit``, before ``evaluate``.
+
+        Which frames were shown is memory as well.
+
+        Raises:
+            SimulationError: the model cannot; then a run has no checkpoints of it.
+        """
 
     def restore(self, blob: bytes) -> None:
-        """Take back the memory that ``save`` returned.
+        """Take back the memory that ``save`` returned, in this process or another; the model may be new.
+
+        What follows is the same as it was after ``save``, to the bit.
 
         Raises:
             ProtocolError: the blob is not one of this model and these bodies.

@@ -144,7 +144,8 @@ class HandShake:
         if course.start >= 0:
             number, state = course.states[provider]
             body["resume"] = {"step": course.start, "state": state, "number": number}
-            self.participants[provider].checkpoints = number - 1
+            if not self.participants[provider].ready:
+                self.participants[provider].checkpoints = number - 1
         return body
 
     def _on_ready(self, message: Any) -> Any:

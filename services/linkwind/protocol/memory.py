@@ -100,14 +100,15 @@ class Memory:
                 "scenario on the way; got one that cannot."
             )
         state = self.model.save()
+        changed = self._build(scenario_json, self._name)
         self.close()
-        self.model = self._build(scenario_json, self._name)
-        if self.model.capabilities != before:
+        self.model = changed
+        if changed.capabilities != before:
             raise ProtocolError(
                 f'"{self._name}": step {step}: expected a model with the same kind of answer, {before}; got '
-                f"{self.model.capabilities}. Run the changed scenario from the beginning."
+                f"{changed.capabilities}. Run the changed scenario from the beginning."
             )
-        self.model.restore(state)
+        changed.restore(state)
 
     def checkpoints(self) -> list[bytes]:
         """Take the checkpoints that were saved."""
