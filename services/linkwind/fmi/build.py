@@ -27,6 +27,8 @@ def c_sources(part: Part, version: FmiVersion) -> dict[str, bytes]:
         f"lw_part_{'aero' if mechanism else 'dynamics'}.c",
         f"lw_fmi{other_version}.c",
         f"fmi{other_version}.h",
+        "lw_affine.c",  # to couple is the importer's
+        "lw_linear.c",
     }
     root = files("linkwind").joinpath("_data", "fmu")
     found = {} if mechanism else {"lw_math.h": root.joinpath("core", "lw_math.h").read_bytes()}
