@@ -9,19 +9,6 @@ enum {
     LANES = 16 /* rows are worked on from and up to multiples of it: no remainders, aligned writes */
 };
 
-/* One version for each set of instructions, chosen when the library is loaded. Without fast-math and
- * contraction they give the same bits. */
-#ifndef LW_CLONES
-#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__has_attribute)
-#if __has_attribute(target_clones)
-#define LW_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
-#endif
-#endif
-#endif
-#ifndef LW_CLONES
-#define LW_CLONES
-#endif
-
 /* What is read and what is written do not overlap; the compiler cannot check it for eighteen pointers. */
 #if defined(__clang__)
 #define LW_INDEPENDENT _Pragma("clang loop vectorize(assume_safety)")
@@ -169,12 +156,34 @@ LW_INLINE void advance_row(const step_job *job, int32_t j) {
     fill(job, j, job->end, nx);
 }
 
-LW_CLONES static void advance_rows(const step_job *step, int32_t part) {
+LW_INLINE void advance_rows(const step_job *step, int32_t part) {
     const int32_t end = smaller(step->lattice->ny, (part + 1) * ROWS);
     for (int32_t j = part * ROWS; j < end; ++j) {
         advance_row(step, j);
     }
 }
+
+/* One version for each set of instructions. Without fast-math and contraction they give the same bits. */
+static void advance_plain(const step_job *step, int32_t part) { advance_rows(step, part); }
+
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(LW_ONE_VERSION)
+__attribute__((target("avx2"))) static void advance_avx2(const step_job *step, int32_t part) {
+    advance_rows(step, part);
+}
+__attribute__((target("avx512f"))) static void advance_avx512(const step_job *step, int32_t part) {
+    advance_rows(step, part);
+}
+
+static void advance(const step_job *step, int32_t part) {
+    switch (step->lattice->instructions) {
+    case LW_AVX512: advance_avx512(step, part); return;
+    case LW_AVX2: advance_avx2(step, part); return;
+    default: advance_plain(step, part);
+    }
+}
+#else
+static void advance(const step_job *step, int32_t part) { advance_plain(step, part); }
+#endif
 
 /* Ahead of the first waves in a fluid at rest numbers are too small for a float: handled in full they make
  * a step three times as slow. */
@@ -182,10 +191,10 @@ static void advance_part(const void *job, int32_t part) {
 #if defined(__SSE__)
     const unsigned mode = _mm_getcsr(), flush_to_zero = 0x8000, denormals_are_zero = 0x0040;
     _mm_setcsr(mode | flush_to_zero | denormals_are_zero);
-    advance_rows(job, part);
+    advance(job, part);
     _mm_setcsr(mode);
 #else
-    advance_rows(job, part);
+    advance(job, part);
 #endif
 }
 

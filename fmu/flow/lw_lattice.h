@@ -33,10 +33,16 @@ typedef struct {
     const float *force;             /* (2, ny, nx) force on the fluid of each cell, x and y, in this step */
     float *blend;                   /* (nx) by how much each column relaxes; written by lw_lattice_init */
     lw_threads *threads;            /* NULL: the caller alone */
+    int32_t instructions;           /* lw_instructions of this processor; written by lw_lattice_init */
 } lw_lattice;
 
-/* Fill everything with the stream, and `blend`. */
-LW_API void lw_lattice_init(const lw_lattice *lattice);
+typedef enum { LW_PLAIN, LW_AVX2, LW_AVX512 } lw_instructions;
+
+/* The widest set of instructions that processor and system have. */
+lw_instructions lw_instructions_here(void);
+
+/* Fill everything with the stream, and `blend` and `instructions`. */
+LW_API void lw_lattice_init(lw_lattice *lattice);
 
 /* Go on by one step: move the window by whole cells, stream, add the force, collide, relax the fringe.
  * Cell (i, j) of the new window is (i + shift_x, j + shift_y) of the old one, to which the force belongs;

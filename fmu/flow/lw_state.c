@@ -48,7 +48,8 @@ float lw_lattice_blend(const lw_lattice *lattice, int32_t distance) {
     return distance < lattice->fringe ? 0.3f * depth * depth * depth : 0.0f;
 }
 
-void lw_lattice_init(const lw_lattice *lattice) {
+void lw_lattice_init(lw_lattice *lattice) {
+    lattice->instructions = lw_instructions_here();
     float stream[LW_DIRECTIONS];
     lw_lattice_stream(lattice, stream);
     for (int q = 0; q < LW_DIRECTIONS; ++q) {

@@ -33,6 +33,7 @@ class _Lattice(ctypes.Structure):
         ("stream", ctypes.c_float * 2),
         ("plane", ctypes.c_int64),
         *((name, ctypes.c_void_p) for name in ("populations", "next", "force", "blend", "threads")),
+        ("instructions", ctypes.c_int32),
     ]
 
 
