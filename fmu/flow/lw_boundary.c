@@ -232,7 +232,7 @@ static void forced_velocity(const lw_lattice *l, const float *force, const doubl
     }
 }
 
-static double leak(const lw_boundary *b, const lw_lattice *l, const float *force, const double *twist) {
+double lw_boundary_leak(const lw_boundary *b, const lw_lattice *l, const float *force, const double *twist) {
     double largest = 0.0;
     for (int k = 0; k < b->count; ++k) {
         int other = b->next[k];
@@ -250,7 +250,7 @@ static double leak(const lw_boundary *b, const lw_lattice *l, const float *force
     return largest;
 }
 
-double lw_boundary_act(lw_boundary *b, lw_lattice *l, float *force, const double *twist) {
+void lw_boundary_act(lw_boundary *b, lw_lattice *l, float *force, const double *twist) {
     double *x = b->solution;
     int64_t plane = (int64_t)l->nx * l->ny;
     int32_t low = l->ny, high = 0;
@@ -272,7 +272,6 @@ double lw_boundary_act(lw_boundary *b, lw_lattice *l, float *force, const double
     }
     l->force_begin = low < high ? low : 0;
     l->force_end = low < high ? high : 0;
-    return leak(b, l, force, twist);
 }
 
 void lw_boundary_clear(const lw_boundary *b, lw_lattice *l, float *force) {

@@ -46,9 +46,13 @@ LW_API int lw_boundary_place(lw_boundary *boundary, const lw_lattice *lattice, c
  * its derivative by the twists, `response` (3 bodies, 3 bodies). */
 LW_API void lw_boundary_wrench(lw_boundary *boundary, const double *twist, double *wrench, double *response);
 
-/* Write the forces on the fluid for these twists to the force array of the lattice, and which rows have any.
- * Returns the largest velocity of the fluid through an outline, halfway between two markers [cells/step]. */
-LW_API double lw_boundary_act(lw_boundary *boundary, lw_lattice *lattice, float *force, const double *twist);
+/* Write the forces on the fluid for these twists to the force array of the lattice, and which rows have any. */
+LW_API void lw_boundary_act(lw_boundary *boundary, lw_lattice *lattice, float *force, const double *twist);
+
+/* The largest velocity of the fluid through an outline, halfway between two markers, under these forces
+ * [cells/step]. */
+LW_API double lw_boundary_leak(const lw_boundary *boundary, const lw_lattice *lattice, const float *force,
+                               const double *twist);
 
 /* Set the cells that lw_boundary_act wrote to zero again. */
 LW_API void lw_boundary_clear(const lw_boundary *boundary, lw_lattice *lattice, float *force);

@@ -96,7 +96,8 @@ class Boundary:
         pointer = ctypes.c_void_p
         self._place = declare("lw_boundary_place", [pointer] * 4)
         self._evaluate = declare("lw_boundary_wrench", [pointer] * 4, None)
-        self._act = declare("lw_boundary_act", [pointer] * 4, ctypes.c_double)
+        self._act = declare("lw_boundary_act", [pointer] * 4, None)
+        self._leak = declare("lw_boundary_leak", [pointer] * 4, ctypes.c_double)
         self._clear = declare("lw_boundary_clear", [pointer] * 3, None)
 
     def place(self, lattice: Lattice, pose: Array) -> tuple[Placement, int]:
@@ -120,23 +121,28 @@ class Boundary:
         self._twist[:] = twist
         self._evaluate(self._self, self._twist_at, *self._out)
 
-    def step(self, lattice: Lattice, twist: Array, shift: tuple[int, int] = (0, 0)) -> float:
+    def step(
+        self, lattice: Lattice, twist: Array, shift: tuple[int, int] = (0, 0), *, look: bool = True
+    ) -> float | None:
         """Let the fluid go on by one step with the bodies where they were placed.
 
         Args:
             lattice: the fluid.
             twist: at the end of the step, shape (n, 3).
             shift: of the window [cells].
+            look: for leaks.
 
         Returns:
-            The largest velocity through an outline, halfway between two markers [cells/step].
+            The largest velocity through an outline, halfway between two markers [cells/step], if looked for.
         """
         self._twist[:] = twist
         force = _at(lattice.force)
-        leak = self._act(self._self, lattice.struct_address, force, self._twist_at)
+        arguments = (self._self, lattice.struct_address, force, self._twist_at)
+        self._act(*arguments)
+        leak = self._leak(*arguments) if look else None
         lattice.step(shift)
         self._clear(self._self, lattice.struct_address, force)
-        return float(leak)
+        return leak
 
 
 def _at(array: NDArray[Any]) -> int:

@@ -31,6 +31,7 @@ from linkwind.spatial import Array, Motion, Wrench
 
 _log = logging.getLogger("linkwind")
 
+LOOK_EVERY = 8  # steps between two looks at the leak, which changes slowly
 _MEMORY = struct.Struct("<qqd")  # step that was committed, the last one with a picture, the leak
 
 
@@ -89,7 +90,7 @@ class Flow:
         if self._fluid is None:
             self._begin(accepted)
         elif step > self._step and not self._ahead:
-            self._leak = self._fluid.go(self._boundary, self._trial.pose, self._wall(t, accepted.twist))
+            self._go(self._trial.pose, self._wall(t, accepted.twist), look=step % LOOK_EVERY == 0)
         self._step, self._ahead = step, False
         self._keep_slow(accepted)
         self._accepted = accepted
@@ -227,12 +228,16 @@ class Flow:
             wall = self._wall(now, at.twist)
             self._boundary.evaluate(self._window.twists(wall))
             total += self._boundary.wrench
-            self._leak = self._window.go(self._boundary, at.pose, wall)
+            self._go(at.pose, wall, look=i == count)
         force = total * (self._scale() / count * self._lengths)
         if self._interior.any:
             inertia = self._interior.inertia(self._trial.pose)
             force += self._inside(t, self._wall(t, self._trial.twist), inertia)
         return force
+
+    def _go(self, pose: Array, wall: Array, *, look: bool) -> None:
+        leak = self._window.go(self._boundary, pose, wall, look=look)
+        self._leak = self._leak if leak is None else leak
 
     def _inside(self, t: float, wall: Array, inertia: Array) -> Array:
         """Return the force that the fluid inside the outlines took, shape (n, 3)."""

@@ -68,13 +68,13 @@ class Window:
         """Put bodies into the window; return what came of it, and the marker it is about."""
         return boundary.place(self.lattice, self.poses(pose))
 
-    def go(self, boundary: Boundary, pose: Array, twist: Array) -> float:
-        """Step the fluid with bodies that are placed, and follow them; return the leak [m/s]."""
+    def go(self, boundary: Boundary, pose: Array, twist: Array, *, look: bool) -> float | None:
+        """Step the fluid with bodies that are placed, and follow them; return the leak [m/s] if to look."""
         away = (self.poses(pose)[:, :2].mean(axis=0) - self._stand).tolist()
         x, y = (int(math.copysign(1.0, far)) if abs(far) > SLACK else 0 for far in away)
-        leak = boundary.step(self.lattice, self.twists(twist), (x, y))
+        leak = boundary.step(self.lattice, self.twists(twist), (x, y), look=look)
         self.offset += (x, y)
-        return leak * self.speed
+        return None if leak is None else leak * self.speed
 
     def halve(self, viscosity: float) -> None:
         """Halve the time of a step; ``viscosity`` in m²/s."""
