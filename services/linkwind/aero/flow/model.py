@@ -59,6 +59,9 @@ class Flow:
         acted = grids.bodies(scenario, provider)
         self._acted = acted
         self._bodies = np.array(body_indices(scenario, provider))
+        first = int(self._bodies[0])
+        in_a_row = (self._bodies == np.arange(first, first + len(acted))).all()
+        self._rows = slice(first, first + len(acted)) if in_a_row else self._bodies
         points = markers(acted, list(scenario.joints), self._grid.cell, self._grid.lattice_viscosity)
         self._boundary = Boundary(len(acted), points)
         self._interior = Interior(acted, self._grid.density)
@@ -85,7 +88,7 @@ class Flow:
 
     def commit(self, t: float, motion: Motion) -> None:
         """Step the fluid to time t [s] with the accepted motion, or keep where it has gone to already."""
-        accepted = planar(motion, self._bodies)
+        accepted = planar(motion, self._rows)
         step = round(t / self._h)
         if self._fluid is None:
             self._begin(accepted)
@@ -102,7 +105,7 @@ class Flow:
             ScenarioError: the window is too small or too large.
             SimulationError: a body leaves the window or meets another, is too fast, or the fluid is unstable.
         """
-        self._trial = planar(motion, self._bodies)
+        self._trial = planar(motion, self._rows)
         if self._fluid is None:
             self._begin(self._trial)
         elif self._ahead:

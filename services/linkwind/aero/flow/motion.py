@@ -31,16 +31,16 @@ class Planar(NamedTuple):
         return fastest
 
 
-def planar(motion: Motion, bodies: Array) -> Planar:
-    """Return the motion of some of the bodies in the plane."""
-    pose, twist = np.empty((len(bodies), 4)), np.empty((len(bodies), 3))
-    orientation = motion.orientation[bodies]
+def planar(motion: Motion, bodies: Array | slice) -> Planar:
+    """Return the motion of some of the bodies in the plane; a slice of them is faster."""
+    orientation, position = motion.orientation[bodies], motion.position[bodies]
+    pose, twist = np.empty((len(position), 4)), np.empty((len(position), 3))
     w, z = orientation[:, 0], orientation[:, 3]
-    pose[:, :2] = motion.position[bodies, :2]
+    pose[:, :2] = position[:, :2]
     pose[:, 2] = w * w - z * z
     pose[:, 3] = 2.0 * w * z
-    twist[:, :2] = motion.linear[bodies, :2]
-    twist[:, 2] = motion.angular[bodies, 2]
+    twist[:, :2] = motion.linear[bodies][:, :2]
+    twist[:, 2] = motion.angular[bodies][:, 2]
     return Planar(pose, twist)
 
 
