@@ -297,8 +297,9 @@ def test_the_new_log_says_where_it_comes_from(tmp_path: Path) -> None:
     assert (log.metadata["resumed_run"], log.metadata["resumed_step"]) == ("whole", "25")
     assert list(log.changes) == [25]
     done = CliRunner().invoke(app, ["log", "info", str(log.path)])
-    assert "resumed  after step 25" in done.stdout
-    assert "after step 25  other settings" in done.stdout
+    assert "how  resumed after step 25 of run whole" in done.stdout
+    assert "how  other settings count after step 25" in done.stdout
+    assert "Resumed after step 25 of run whole." in log.path.with_name("report.html").read_text()
     assert json.loads(log.scenario_json)["environment"]["gravity"] == [0.0, -9.81, 0.0]
 
 

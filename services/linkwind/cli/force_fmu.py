@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -29,12 +29,21 @@ def load_with(
     Raises:
         InputError: something of it does not fit together.
     """
-    from linkwind.aero.fmu import settle
     from linkwind.scenario import load
 
-    scenario = load(source, overrides)
-    files = dict(_named(scenario, text) for text in given)
-    scenario = load(source, [*overrides, *(f"providers.{name}.model=fmu" for name in files)])
+    files = files_by_provider(load(source, overrides), given)
+    return settled(load(source, [*overrides, *as_models(files)]), files)
+
+
+def as_models(files: Mapping[str, Path]) -> list[str]:
+    """Return the overrides that put FMUs in the place of models."""
+    return [f"providers.{name}.model=fmu" for name in files]
+
+
+def settled(scenario: Scenario, files: dict[str, Path]) -> tuple[Scenario, dict[str, Path], list[str]]:
+    """Return the scenario with what the FMUs say of themselves, their files by provider, their mappings."""
+    from linkwind.aero.fmu import settle
+
     providers, tables = list(scenario.providers), []
     for index, provider in enumerate(providers):
         if provider.name in files:
@@ -67,12 +76,15 @@ def _named(scenario: Scenario, text: str) -> tuple[str, Path]:
     raise InputError(f"--force-fmu: expected PROVIDER=FILE with one of {', '.join(names)}; got {text}.")
 
 
-def refuse_missing(scenario: Scenario, files: dict[str, Path]) -> None:
-    """Raise InputError for a provider that needs a file and has none."""
+def refuse_missing(
+    scenario: Scenario, files: Mapping[str, Path], names: Collection[str] | None = None
+) -> None:
+    """Raise InputError for a provider that needs a file and has none: any, or one of ``names``."""
     from linkwind.errors import InputError
 
     for provider in scenario.providers:
-        if provider.model == "fmu" and provider.name not in files:
+        wanted = names is None or provider.name in names
+        if wanted and provider.model == "fmu" and provider.name not in files:
             raise InputError(
                 f'{scenario.source}: provider "{provider.name}": expected the file of its FMU; got '
                 f"none. Add --force-fmu {provider.name}=FILE."

@@ -32,6 +32,7 @@ def info(log: LogArgument, as_json: JsonOption = False) -> None:
 
     Example: linkwind log info runs/two_link-20260101-120000/log.mcap
     """
+    from linkwind.log.origin import origin
     from linkwind.log.reader import open_log
 
     opened = open_log(log)
@@ -42,19 +43,15 @@ def info(log: LogArgument, as_json: JsonOption = False) -> None:
     ending = "yes" if opened.complete else f"no: {opened.error or 'the run was cut off'}"
     if opened.damage is not None:
         ending += f" ({opened.damage.text})"
-    rows = {
-        "run": opened.run,
-        "scenario": about["scenario"],
-        "steps": about["steps"],
-        "complete": ending,
-        **({"resumed": f"after step {resumed}"} if (resumed := opened.metadata.get("resumed_step")) else {}),
-        **{f"  after step {step}": "other settings" for step in opened.changes},
+    head = {"run": opened.run, "scenario": about["scenario"], "steps": about["steps"], "complete": ending}
+    rest = {
         "final state": opened.final_state_sha256 or "none",
         "messages": about["messages"],
         **{f"  {topic}": count for topic, count in about["topics"].items()},
         **about["versions"],
     }
-    for name, value in rows.items():
+    made = [("how", text) for text in origin(opened)]
+    for name, value in [*head.items(), *made, *rest.items()]:
         typer.echo(f"{name:>20}  {value}")
 
 

@@ -7,8 +7,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from linkwind.cli.force_fmu import ForceFmuOption
 from linkwind.cli.keys import keys
-from linkwind.cli.options import ConnectOption, JsonOption, ListenOption, LogArgument
+from linkwind.cli.options import (
+    ConnectOption,
+    JsonOption,
+    ListenOption,
+    LogArgument,
+    OutOption,
+    SetOption,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -36,19 +44,44 @@ def replay(
     loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end, until Ctrl-C.")] = False,
     listen: ListenOption = None,
     connect: ConnectOption = None,
+    substitute: Annotated[
+        str | None,
+        typer.Option(
+            metavar="dynamics|PROVIDER",
+            help="This side is live, under --set, the other one recorded; nothing is published.",
+        ),
+    ] = None,
+    set_: SetOption = None,
+    force_fmu: ForceFmuOption = None,
+    out: OutOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Publish the messages of a log as the run did, once somebody subscribes.
 
     On a terminal, the space bar pauses and goes on, a dot lets one step pass, Ctrl-C ends.
 
+    With --substitute PROVIDER, that provider is asked again about the recorded motion; it is started here, or
+    comes from elsewhere to --listen or --connect. With --substitute dynamics, new dynamics move under the
+    recorded forces; with --connect, dynamics elsewhere do. --set, --force-fmu, --out are for these alone.
+
     Example: linkwind replay runs/two_link-20260101-120000/log.mcap --rate 0.5 --listen tcp/0.0.0.0:7447
+
+    Example: linkwind replay LOG --substitute aero --set aero.model=none
+
+    Example: linkwind replay LOG --substitute dynamics --set bodies.link1.mass=2.5
     """
+    if substitute is not None:
+        from linkwind.cli.substitute import substitute as put_in_place
+
+        put_in_place(log, substitute, set_ or [], force_fmu or [], out, listen or [], connect or [], as_json)
+        return
+    if set_ or force_fmu or out:
+        raise typer.BadParameter("expected --substitute with --set, --force-fmu and --out; got none")
     from linkwind.cli.run import DEFAULT_ENDPOINT
     from linkwind.log.reader import open_log
+    from linkwind.runs.keeping import terminate_as_interrupt
     from linkwind.runs.replay import Selection, Steering
     from linkwind.runs.replay import replay as replay_log
-    from linkwind.runs.run import terminate_as_interrupt
 
     opened = open_log(log)
     chosen = tuple(topic for text in topics or () for topic in text.split(","))

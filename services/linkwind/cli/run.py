@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
@@ -22,6 +22,8 @@ from linkwind.cli.options import (
 if TYPE_CHECKING:
     from linkwind.runs.run import Outcome, Progress
     from linkwind.scenario import Scenario
+
+T = TypeVar("T")
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
@@ -97,7 +99,7 @@ def _show(scenario: Scenario, job: Callable[[Progress], Outcome], *, as_json: bo
     print_summary(behind_a_bar(scenario.name, scenario.steps, job))
 
 
-def behind_a_bar(name: str, steps: int, job: Callable[[Progress], Outcome]) -> Outcome:
+def behind_a_bar(name: str, steps: int, job: Callable[[Progress], T]) -> T:
     """Do the job of so many steps behind a progress bar."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn

@@ -42,7 +42,7 @@ def aero(
     Example: linkwind aero --connect tcp/10.0.0.2:7447
     """
     from linkwind.cli.run import DEFAULT_ENDPOINT
-    from linkwind.runs.run import terminate_as_interrupt
+    from linkwind.runs.keeping import terminate_as_interrupt
 
     if not connect and not listen:
         connect = [DEFAULT_ENDPOINT]

@@ -39,15 +39,17 @@ def verify(
 
     Example: linkwind verify runs/two_link-20260101-120000/log.mcap
     """
+    from linkwind.log.contents import DYNAMICS, SUBSTITUTED
     from linkwind.runs.verify import changes_of, scenario_of
     from linkwind.runs.verify import verify as verify_log
 
     opened, scenario = scenario_of(log)
     steps = [scenario, *changes_of(opened).values()][-1].steps
     files: dict[str, Path] = {}
-    if not from_recorded_wrenches:
+    live = opened.metadata.get(SUBSTITUTED)
+    if not from_recorded_wrenches and live != DYNAMICS:
         files = files_by_provider(scenario, force_fmu or [])
-        refuse_missing(scenario, files)
+        refuse_missing(scenario, files, None if live is None else [live])
 
     def job(progress: Callable[[int], None]) -> Verified:
         return verify_log(opened, scenario, progress, files, from_recorded_wrenches=from_recorded_wrenches)
@@ -113,12 +115,13 @@ def diff(
     for remark in found.remarks:
         typer.echo(f"note: {remark}", err=as_json)
     if not as_json:
-        _show_diff(found, one, other, rtol)
+        show_diff(found, rtol)
     if not found.identical:
         raise typer.Exit(DIFFERENT)
 
 
-def _show_diff(found: Compared, one: Path, other: Path, rtol: float) -> None:
+def show_diff(found: Compared, rtol: float) -> None:
+    """Print what differs between two logs."""
     within = f" within {rtol:g} of the largest values" if rtol else ""
     if found.first is None:
         typer.echo(f"identical{within}: {found.points} communication points")

@@ -1,4 +1,4 @@
-"""What the dynamics writes to the log: messages as they are, accepted states with what follows from them."""
+"""What the dynamics writes to the log of the accepted states, and what follows from them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from linkwind.coupling import CommunicationPoint
 from linkwind.frames import FlowFrame
-from linkwind.log.state import StateEncoder, StepEncoder, TimingEncoder
+from linkwind.log.state import StateEncoder, StepEncoder
 from linkwind.mechanism import Mechanism
 from linkwind.native.multibody import Multibody
 from linkwind.scenario import Scenario
@@ -33,9 +33,10 @@ class MessageLog(Protocol):
 
 
 class Recorder:
-    """Computes what belongs to each communication point, writes the log, keeps what the summary needs.
+    """Computes what belongs to each communication point, writes it, keeps what the summary needs.
 
     Attributes:
+        log: to write to.
         joint_gap_max: largest distance of two joint points so far, from the poses [m].
         force_max: largest aerodynamic force on a body so far [N].
         multibody: by which points are evaluated.
@@ -47,17 +48,11 @@ class Recorder:
         n = multibody.n
         self.joint_gap_max = 0.0
         self.force_max = 0.0
-        self.motion = log.motion
-        self.wrench = log.wrench
-        self.frame = log.frame
-        self.checkpoint = log.checkpoint
-        self.diagnostics = log.diagnostics
-        self._log = log
+        self.log = log
         self.multibody = multibody
         self._step_ns = scenario.coupling.step_ns
         self._state = StateEncoder(n, multibody.nq, multibody.nv)
         self._step = StepEncoder(scenario.coupling.order)
-        self._timing = TimingEncoder()
         self._accepted, self._accepted_twist = _motion_and_twist(n)
         self._trial, self._trial_twist = _motion_and_twist(n)
         self._total = Wrench.zeros(n)
@@ -90,12 +85,12 @@ class Recorder:
             dissipated_work=point.state.dissipated_work,
             joint_gap=gap,
         )
-        self._log.state(payload, time_ns)
+        self.log.state(payload, time_ns)
         self._coupling(point, time_ns)
         force = self._total.force
         force[:] = result.total_wrench[:, :3]
         self._total.torque[:] = result.total_wrench[:, 3:]
-        self._log.scene(time_ns, self._accepted, self._total)
+        self.log.scene(time_ns, self._accepted, self._total)
         self.joint_gap_max = max(self.joint_gap_max, gap)
         self.force_max = max(self.force_max, math.sqrt((force * force).sum(axis=1).max()))
 
@@ -115,11 +110,7 @@ class Recorder:
             residual=math.sqrt(squared),
             interface_energy=float(power) * self._step_ns / 1e9,
         )
-        self._log.step(payload, time_ns)
-
-    def timing(self, step: int, time_ns: int, exchange_ns: int) -> None:
-        """Write how long an exchange took on the wall clock."""
-        self._log.timing(self._timing.encode(step, exchange_ns), time_ns)
+        self.log.step(payload, time_ns)
 
 
 def _motion_and_twist(n: int) -> tuple[Motion, Array]:

@@ -1,8 +1,4 @@
-"""The dynamics service: a coupling scheme drives the mechanism over the bus and keeps the log.
-
-What is expensive but not urgent, the log above all, is done between posting a motion and the answer to
-it, while the providers compute.
-"""
+"""The dynamics service: a coupling scheme drives the mechanism over the bus and keeps the log."""
 
 from __future__ import annotations
 
@@ -17,16 +13,15 @@ import numpy as np
 
 from linkwind.bus.base import DynamicsLink
 from linkwind.coupling import SCHEMES, Answer, CommunicationPoint, Settings
+from linkwind.dynamics.exchanges import Exchanges
 from linkwind.dynamics.plant import MechanismPlant, State, acceleration_weight
 from linkwind.dynamics.recorder import Recorder
 from linkwind.dynamics.timing import ExchangeTimes
-from linkwind.errors import LostError, ScenarioError, StoppedError
+from linkwind.errors import ScenarioError
 from linkwind.mechanism import Mechanism, build
-from linkwind.protocol import Course, DynamicsSession, fault
+from linkwind.protocol import Course, DynamicsSession
 from linkwind.scenario import Scenario
 from linkwind.spatial import Motion
-
-GOODBYE_TIMEOUT = 5.0  # s that a provider may take to commit the last state and say Bye
 
 
 @dataclass(frozen=True)
@@ -96,7 +91,7 @@ class DynamicsService:
         self.multibody = self._plant.multibody
         self._pending: deque[CommunicationPoint] = deque()
         self._times = ExchangeTimes()
-        self._exchanges = 0
+        self._exchanged = 0
 
     def run(
         self,
@@ -118,41 +113,24 @@ class DynamicsService:
             AnswerTimeoutError, FaultError, ProtocolError, SimulationError: as they say.
             StoppedError: Ctrl-C or SIGTERM.
         """
-        self._link, self._recorder = link, recorder
-        try:
-            # A state that blows up is stopped by the core, with a reason; the log shows the way there.
-            with np.errstate(over="ignore", invalid="ignore"):
-                self._await_providers(poll)
-                recorder.diagnostics({p.name: p.diagnostics for p in self.session.participants.values()})
-                start = time.perf_counter()
-                final = self._march(progress)
-                wall = time.perf_counter() - start
-                self._say_goodbye(final, poll)
-        except KeyboardInterrupt:
-            stopped = StoppedError(f"stopped at {self.session.where()}")
-            link.fault(fault("dynamics", *self.session.motion.at, stopped))
-            raise stopped from None
-        except BaseException as error:
-            link.fault(fault("dynamics", *self.session.motion.at, error))
-            raise
+        self._recorder = recorder
+        self._exchanges = Exchanges(self.session, link, recorder.log)
+        # A state that blows up is stopped by the core, with a reason; the log shows the way there.
+        with self._exchanges.ended_for_all(), np.errstate(over="ignore", invalid="ignore"):
+            self._exchanges.await_providers(self.scenario.bus.start_timeout, poll)
+            start = time.perf_counter()
+            final = self._march(progress)
+            wall = time.perf_counter() - start
+            self._say_goodbye(final, poll)
         return Result(
             steps=self._steps,
-            exchanges=self._exchanges,
+            exchanges=self._exchanged,
             wall_s=wall,
             exchange_us=self._times,
             joint_gap_max_m=recorder.joint_gap_max if self.mechanism.has_joints else None,
             force_max_N=recorder.force_max,
-            final_state_sha256=self._digest(final),
+            final_state_sha256=digest(self.session.motion.accepted),
         )
-
-    def _await_providers(self, poll: Callable[[], None]) -> None:
-        timeout = self.scenario.bus.start_timeout
-        if not self._link.wait(lambda: not self.session.not_ready, timeout, poll):
-            missing = " and ".join(f'"{name}"' for name in self.session.not_ready)
-            raise LostError(
-                f"{missing} did not come within {timeout:g} s (bus.start_timeout). Start it with: "
-                f"linkwind aero --connect ENDPOINT --name {self.session.not_ready[0]}"
-            )
 
     def _march(self, progress: Callable[[int], None]) -> State:
         """Let the coupling scheme do every step; return the last state."""
@@ -198,53 +176,28 @@ class DynamicsService:
 
     def _exchange(self, step: int, iteration: int, accepted: State, trial: State) -> Answer:
         """Post both states, write the log, return the sum of the providers' answers."""
-        session, link, motion = self.session, self._link, self.session.motion
+        motion = self.session.motion
         self._plant.multibody.motion(accepted.values, motion.accepted)
         self._plant.multibody.motion(trial.values, motion.trial)
-        start, payload = time.perf_counter_ns(), session.post(step, iteration)
-        link.post(payload)
-        self._write_pending()
-        self._recorder.motion(payload, motion.time_ns)
-        while not session.answered:
-            provider, answer = link.receive()
-            if session.accept(provider, answer):
-                self._recorder.wrench(provider, answer, motion.time_ns)
-        took = time.perf_counter_ns() - start
-        self._exchanges += 1
+        took = self._exchanges.ask(self.session.post(step, iteration), self._write_pending)
+        self._exchanged += 1
         if step >= self.live_from:
             self._times.add(took)
-        self._recorder.timing(step, motion.time_ns, took)
-        self._take_shown()
-        return Answer(*session.total())
+        return Answer(*self.session.total())
 
     def _write_pending(self) -> None:
         while self._pending:
             self._recorder.point(self._pending.popleft())
-
-    def _take_shown(self) -> None:
-        """Write frames and checkpoints that came with the last answers: after all of these, in one order."""
-        for provider, payload in sorted(self._link.checkpoints(), key=lambda sent: sent[0]):
-            time_ns = self.session.checkpoint(provider, payload).time_ns
-            self._recorder.checkpoint(provider, payload, time_ns)
-        for provider, payload in sorted(self._link.frames(), key=lambda sent: sent[0]):
-            self._recorder.frame(provider, self.session.frame(provider, payload))
 
     def _say_goodbye(self, final: State, poll: Callable[[], None]) -> None:
         motion = self.session.motion
         self._plant.multibody.motion(final.values, motion.accepted)
         self._plant.multibody.motion(final.values, motion.trial)
         payload = self.session.post(self._steps, 0, final=True)
-        self._link.post(payload)
-        self._write_pending()
-        self._recorder.motion(payload, motion.time_ns)
-        if not self._link.wait(lambda: not self.session.not_gone, GOODBYE_TIMEOUT, poll):
-            missing = " and ".join(f'"{name}"' for name in self.session.not_gone)
-            raise LostError(f"{missing} did not say Bye within {GOODBYE_TIMEOUT:g} s of the last step")
-        self._take_shown()
-        self.session.check_frames()
+        self._exchanges.say_goodbye(payload, poll, self._write_pending)
 
-    def _digest(self, final: State) -> str:
-        motion = Motion.at_rest(len(self.mechanism.bodies))
-        self._plant.multibody.motion(final.values, motion)
-        parts = [motion.position, motion.orientation, motion.linear, motion.angular]
-        return hashlib.sha256(np.hstack(parts).astype("<f8").tobytes()).hexdigest()
+
+def digest(motion: Motion) -> str:
+    """Return the SHA-256 of poses and twists, little-endian float64, body by body."""
+    parts = [motion.position, motion.orientation, motion.linear, motion.angular]
+    return hashlib.sha256(np.hstack(parts).astype("<f8").tobytes()).hexdigest()

@@ -27,6 +27,12 @@ VERSIONS = "linkwind.versions"  # metadata: versions of the programs, processor
 DIAGNOSTICS = "linkwind.diagnostics"  # metadata: names of each provider's own numbers; missing without any
 END = "linkwind.end"  # metadata: how the run ended; missing when the writer was killed
 
+# In RUN, where the run does not come from a scenario alone:
+RESUMED_STEP, CHANGES = "resumed_step", "changes"  # after which step it went on; scenarios by step (JSON)
+SUBSTITUTED = "substituted"  # which side was live, DYNAMICS or the name of a provider
+RECORD = "recorded_log"  # the file that the other side comes from
+DYNAMICS = "dynamics"
+
 
 def message_name(topic: str) -> str | None:
     """Return the name of the message that a topic carries, None for a topic that is not linkwind's."""

@@ -121,7 +121,7 @@ class Log:
     @property
     def changes(self) -> dict[int, str]:
         """Scenarios that a resumed run went on with, by the step after which each counts."""
-        changes = json.loads(self.metadata.get("changes", "{}"))
+        changes = json.loads(self.metadata.get(contents.CHANGES, "{}"))
         return {step: changes[str(step)] for step in sorted(map(int, changes))}
 
     @property

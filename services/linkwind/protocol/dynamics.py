@@ -64,10 +64,31 @@ class DynamicsSession(HandShake):
         self.motion.stamp(step, iteration, time_ns)
         if final:
             self.motion.final = True
+        self._ask()
+        return self.motion.payload()
+
+    def _ask(self) -> None:
         for p in self.participants.values():
             p.answered = False
         self._waiting = len(self.participants)
-        return self.motion.payload()
+
+    def repeat(self, payload: bytes) -> None:
+        """Take a motion message of another time, to be sent again as it is.
+
+        Raises:
+            ProtocolError: it is not one of this run.
+        """
+        self.motion.load(payload, "motion to send again")
+        self._ask()
+
+    def end(self) -> bytes:
+        """Return the message that ends the run with the accepted state of the last motion."""
+        motion = self.motion
+        if motion.final:
+            return motion.payload()
+        for name in ("position", "orientation", "linear", "angular"):
+            np.copyto(getattr(motion.trial, name), getattr(motion.accepted, name))
+        return self.post(max(0, motion.at[0] - 1), 0, final=True)
 
     def accept(self, provider: str, payload: bytes) -> bool:
         """Take a wrench message into its arrays; False if it is a repeated or stale one.

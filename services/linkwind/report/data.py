@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwind.log.contents import STATE, STEP, TIMING, WRENCH
+from linkwind.log.origin import origin
 from linkwind.log.reader import Log, open_log
 from linkwind.log.tables import Trajectory, seconds
 from linkwind.report.flow import Flow, survey
@@ -46,6 +47,7 @@ class Run:
         complete: whether the run came to its end.
         error: what ended it early, or is wrong with its log; None if nothing is known.
         versions: versions and hashes, by name.
+        origin: what the run was made from, if not from its scenario alone; a sentence each.
         trajectory: the accepted states, shape (k, …); k may be 0.
         coupling_time: t of each exchange [s], shape (m,).
         order: degree of the extrapolation, shape (m,).
@@ -69,6 +71,7 @@ class Run:
     exchange: Array
     flows: tuple[Flow, ...] = ()
     diagnostics: tuple[Diagnostics, ...] = ()
+    origin: tuple[str, ...] = ()
 
     @property
     def steps(self) -> int:
@@ -156,6 +159,7 @@ def read(path: Path) -> Run:
         exchange=log.timing().exchange_ns / np.float64(1e9) if TIMING in log.topics else np.empty(0),
         flows=tuple(filter(None, (survey(name, partial(log.frames, name)) for name in log.flows))),
         diagnostics=tuple(_diagnostics(log)),
+        origin=tuple(origin(log)),
     )
 
 

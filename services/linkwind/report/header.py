@@ -32,6 +32,11 @@ def banner(run: Run) -> str:
     return f'<div class="banner" role="alert">{text}</div>'
 
 
+def made_from(run: Run) -> str:
+    """Return what the run was made from; nothing where that is its scenario alone."""
+    return "".join(f'<p class="origin">{escape(text[0].upper() + text[1:])}.</p>' for text in run.origin)
+
+
 def tiles(run: Run) -> str:
     """Return the summary: what, how much, a detail."""
     coupling, dynamics = run.scenario["coupling"], run.scenario["dynamics"]

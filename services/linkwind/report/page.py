@@ -13,7 +13,7 @@ from plotly.offline import get_plotlyjs
 from linkwind.report.arrays import pack
 from linkwind.report.data import Run
 from linkwind.report.gallery import gallery
-from linkwind.report.header import badge, banner, note, tiles
+from linkwind.report.header import badge, banner, made_from, note, tiles
 from linkwind.report.panels import panels
 from linkwind.report.scene import scene
 from linkwind.report.tables import tables
@@ -31,6 +31,7 @@ def render(run: Run) -> str:
         badge=badge(run),
         description=escape(run.scenario.get("description", "")),
         banner=banner(run),
+        origin=made_from(run),
         tiles=tiles(run),
         gallery=gallery(run),
         note=note(run),

@@ -19,6 +19,7 @@ from linkwind import aero
 from linkwind.bus.base import DynamicsLink
 from linkwind.dynamics.service import DynamicsService
 from linkwind.errors import InputError, LogError
+from linkwind.log.contents import CHANGES, RESUMED_STEP, SUBSTITUTED
 from linkwind.log.reader import Log
 from linkwind.log.writer import LogWriter
 from linkwind.mechanism import build
@@ -80,6 +81,11 @@ def plan(log: Log, from_step: int | None = None, overrides: Sequence[str] = ()) 
         ScenarioError: a setting is wrong, or may not change in a run.
         InputError: the run is over, and nothing is to be done.
     """
+    if SUBSTITUTED in log.metadata:
+        raise InputError(
+            f"{log.path}: expected a run with both sides live; got one with a recorded side. Make it again "
+            "from the record, with linkwind replay --substitute."
+        )
     scenario = from_json(log.scenario_json)
     step_ns = scenario.coupling.step_ns
     last = last_step(log, step_ns)
@@ -157,15 +163,15 @@ def resume(
         comparison = Comparison(log, scenario, mechanism, wrenches=False)
         return ContinuedLog(writer, record, comparison, found.last, step_ns)
 
-    beginning = Beginning(link, new_log, _metadata(found))
+    beginning = Beginning(_metadata(found), link, new_log)
     folder = folders.create(scenario.name, out)
     return Resumed(with_providers(service, folder, progress, files, beginning), found)
 
 
 def _metadata(found: Plan) -> dict[str, str]:
     """Return what the new log says of where it comes from."""
-    record = {"resumed_run": found.log.run, "resumed_step": str(found.last)}
+    record = {"resumed_run": found.log.run, RESUMED_STEP: str(found.last)}
     if found.changes:
         changes = {str(step): changed.to_json() for step, changed in found.changes.items()}
-        record["changes"] = json.dumps(changes)
+        record[CHANGES] = json.dumps(changes)
     return record

@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-import signal
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType, MappingProxyType
+from types import MappingProxyType
 from typing import Any
 
 from linkwind import aero
 from linkwind.bus.base import DynamicsLink
 from linkwind.dynamics.recorder import MessageLog, Recorder, tables_sha256
 from linkwind.dynamics.service import DynamicsService, Result
-from linkwind.errors import InputError, LinkwindError, ScenarioError
+from linkwind.errors import InputError, ScenarioError
 from linkwind.log.writer import LogWriter
 from linkwind.mechanism import build
 from linkwind.native.library import library_sha256
 from linkwind.runs import folder as folders
-from linkwind.runs.children import children
+from linkwind.runs.here import providers_here, zenoh_link
+from linkwind.runs.keeping import keep
 from linkwind.scenario import Scenario
-
-PORTS_TRIED = 5
 
 
 @dataclass(frozen=True)
@@ -68,11 +65,20 @@ Progress = Callable[[int], None]
 
 @dataclass(frozen=True)
 class Beginning:
-    """What a run that goes on from a log puts in front of the bus and of the new log; the log says so."""
+    """What a run made from a log puts in front of the bus and of the new log; the new log says so.
 
-    link: Callable[[DynamicsLink], DynamicsLink]
-    log: Callable[[LogWriter], MessageLog]
+    Attributes:
+        metadata: for the new log.
+        link: puts something in front of the bus.
+        log: puts something in front of the new log.
+    """
+
     metadata: Mapping[str, str]
+    link: Callable[[DynamicsLink], DynamicsLink] = lambda link: link
+    log: Callable[[LogWriter], MessageLog] = lambda writer: writer
+
+
+NEW = Beginning({})
 
 
 def run(
@@ -104,20 +110,11 @@ def with_providers(
     folder: Path,
     progress: Progress,
     files: Mapping[str, Path],
-    beginning: Beginning | None = None,
+    beginning: Beginning = NEW,
 ) -> Outcome:
     """Run a service with every provider on this machine; see :func:`run`."""
-    scenario = service.scenario
-    if scenario.bus.transport == "inprocess":
-        return _drive(service, folder, progress, _inprocess(service, files), lambda: None, beginning)
-    link, endpoint = _listen_here(service, scenario)
-    with children(folder) as providers:
-        for name in service.session.providers:
-            arguments = ["aero", "--connect", endpoint, "--name", name, "--run", service.session.run]
-            if name in files:
-                arguments += ["--force-fmu", str(files[name].resolve())]
-            providers.start(name, [*arguments, "--start-timeout", str(scenario.bus.start_timeout)])
-        return _drive(service, folder, progress, link, providers.check, beginning)
+    with providers_here(service.session, service.scenario, folder, files) as (link, poll):
+        return drive(service, folder, progress, link, poll, beginning)
 
 
 def dynamics(
@@ -144,62 +141,34 @@ def dynamics(
     folder = folders.create(scenario.name, out)
     service = DynamicsService(scenario, mechanism, run_id or folders.run_id(folder))
     try:
-        link = zenoh_link(service, scenario, listen, connect)
+        link = zenoh_link(service.session, scenario, listen, connect)
     except InputError:
         folder.rmdir()
         raise
-    return _drive(service, folder, progress, link, lambda: None)
+    return drive(service, folder, progress, link)
 
 
-def _drive(
+def drive(
     service: DynamicsService,
     folder: Path,
     progress: Progress,
     link: DynamicsLink,
-    poll: Callable[[], None],
-    beginning: Beginning | None = None,
+    poll: Callable[[], None] = lambda: None,
+    beginning: Beginning = NEW,
 ) -> Outcome:
-    """Run the service, close the log with how it ended, write the report either way."""
-    log, report, scenario = folder / "log.mcap", folder / "report.html", service.scenario
-    metadata = beginning.metadata if beginning else {}
-    try:
-        with terminate_as_interrupt(), closing(link), _open_log(log, service, metadata) as writer:
-            messages = beginning.log(writer) if beginning else writer
-            recorder = Recorder(messages, scenario, service.mechanism, service.multibody)
-            result = service.run(beginning.link(link) if beginning else link, recorder, progress, poll)
-            writer.close(final_state_sha256=result.final_state_sha256)
-    except LinkwindError as error:
-        if not log.exists():
-            raise
-        raise type(error)(f"{error}\nlog: {log}\nreport: {_report(log, report) or report}") from error
-    return Outcome(scenario.name, result, log, report, _report(log, report))
+    """Run the service over an open end of the bus, close that, and keep the log; see :func:`run`."""
+
+    def job(writer: LogWriter) -> Result:
+        recorder = Recorder(beginning.log(writer), service.scenario, service.mechanism, service.multibody)
+        result = service.run(beginning.link(link), recorder, progress, poll)
+        writer.close(final_state_sha256=result.final_state_sha256)
+        return result
+
+    kept = keep(folder, link, lambda path: _new_log(path, service, beginning.metadata), job)
+    return Outcome(service.scenario.name, kept.result, kept.log, kept.report, kept.report_trouble)
 
 
-def _report(log: Path, report: Path) -> str:
-    """Write the report; return what went wrong, which must not hide how the run went."""
-    from linkwind.report import write_report
-
-    try:
-        write_report(log, report)
-    except LinkwindError as error:
-        return str(error)
-    return ""
-
-
-def _listen_here(service: DynamicsService, scenario: Scenario) -> tuple[DynamicsLink, str]:
-    """Open the dynamics' end on a free port of this machine; return it and its endpoint."""
-    from linkwind.bus.zenoh import loopback_endpoint
-
-    for _ in range(PORTS_TRIED):
-        endpoint = loopback_endpoint()
-        try:
-            return zenoh_link(service, scenario, [endpoint], []), endpoint
-        except InputError as error:  # somebody took the port between asking and listening
-            taken = error
-    raise taken
-
-
-def _open_log(path: Path, service: DynamicsService, metadata: Mapping[str, str]) -> LogWriter:
+def _new_log(path: Path, service: DynamicsService, metadata: Mapping[str, str]) -> LogWriter:
     return LogWriter(
         path,
         run=service.session.run,
@@ -212,35 +181,3 @@ def _open_log(path: Path, service: DynamicsService, metadata: Mapping[str, str])
             **metadata,
         },
     )
-
-
-def zenoh_link(
-    service: DynamicsService, scenario: Scenario, listen: Sequence[str], connect: Sequence[str]
-) -> DynamicsLink:
-    """Open the dynamics' end of a zenoh bus."""
-    from linkwind.bus.zenoh import ZenohDynamicsLink
-
-    return ZenohDynamicsLink(service.session, listen, connect, scenario.coupling.timeout)
-
-
-def _inprocess(service: DynamicsService, files: Mapping[str, Path]) -> DynamicsLink:
-    from linkwind.aero.service import session
-    from linkwind.bus.inprocess import InProcessLink
-
-    return InProcessLink(
-        service.session, [session(name, files.get(name)) for name in service.session.providers]
-    )
-
-
-@contextmanager
-def terminate_as_interrupt() -> Iterator[None]:
-    """Let SIGTERM end the block the way Ctrl-C does, so that the log is closed and nobody is left waiting."""
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)

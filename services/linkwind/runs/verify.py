@@ -16,13 +16,16 @@ from linkwind import schema
 from linkwind.bus.base import DynamicsLink
 from linkwind.dynamics.recorder import Recorder, tables_sha256
 from linkwind.dynamics.service import DynamicsService
-from linkwind.errors import LinkwindError, LogError
+from linkwind.errors import InputError, LinkwindError, LogError
+from linkwind.log.contents import DYNAMICS, SUBSTITUTED
 from linkwind.log.difference import Difference
 from linkwind.log.reader import Log, open_log
 from linkwind.log.versions import versions
 from linkwind.mechanism import Mechanism, build
 from linkwind.native.library import library_sha256
 from linkwind.runs.comparison import Comparison
+from linkwind.runs.here import inprocess_link
+from linkwind.runs.live_provider import RecordedMotion
 from linkwind.runs.recorded import DifferError, LogEndsError, RecordedWrenches
 from linkwind.scenario import Scenario, from_json
 
@@ -74,17 +77,15 @@ def verify(
         LogError: there is nothing to compare.
         InputError: the log's scenario cannot be run here, or a file is missing or another one.
     """
+    recorded = from_recorded_wrenches or log.metadata.get(SUBSTITUTED) == DYNAMICS
     mechanism = build(scenario)
-    service = DynamicsService(scenario, mechanism, log.run, changes_of(log))
-    comparison = Comparison(log, scenario, mechanism, wrenches=not from_recorded_wrenches)
-    link: DynamicsLink
-    link = RecordedWrenches(service.session, log) if from_recorded_wrenches else _providers(service, files)
+    comparison = Comparison(log, scenario, mechanism, wrenches=not recorded)
+    link, again = _again(log, scenario, mechanism, comparison, files, recorded=recorded)
     remark = "" if log.complete else _why(log)
     difference: Difference | None = None
     with closing(link):
         try:
-            recorder = Recorder(comparison, scenario, mechanism, service.multibody)
-            digest = service.run(link, recorder, progress).final_state_sha256
+            digest = again(progress)
             difference = comparison.left_over("none: the run is over") or comparison.end(log, digest)
         except DifferError as found:
             difference = found.difference
@@ -109,12 +110,40 @@ def changes_of(log: Log) -> dict[int, Scenario]:
     return {step: from_json(text) for step, text in log.changes.items()}
 
 
-def _providers(service: DynamicsService, files: Mapping[str, Path]) -> DynamicsLink:
-    from linkwind.aero.service import session
-    from linkwind.bus.inprocess import InProcessLink
+def _again(
+    log: Log,
+    scenario: Scenario,
+    mechanism: Mechanism,
+    comparison: Comparison,
+    files: Mapping[str, Path],
+    *,
+    recorded: bool,
+) -> tuple[DynamicsLink, Callable[[Progress], str]]:
+    """Return a bus, and what makes everything again over it and returns the hash of the last state.
 
-    providers = [session(name, files.get(name)) for name in service.session.providers]
-    return InProcessLink(service.session, providers)
+    Args:
+        log: of the run.
+        scenario: of the log.
+        mechanism: of the scenario.
+        comparison: takes the messages.
+        files: of the providers whose model is made from a file, by name.
+        recorded: take the wrenches from the log.
+    """
+    live = log.metadata.get(SUBSTITUTED, DYNAMICS)
+    if live == DYNAMICS:
+        service = DynamicsService(scenario, mechanism, log.run, changes_of(log))
+        session = service.session
+        recorder = Recorder(comparison, scenario, mechanism, service.multibody)
+        link = RecordedWrenches(session, log) if recorded else inprocess_link(session, files)
+        return link, lambda progress: service.run(link, recorder, progress).final_state_sha256
+    if recorded:
+        raise InputError(
+            f"{log.path}: --from-recorded-wrenches: expected a log whose motion follows from its wrenches; "
+            f'got one of "{live}" against recorded motion. Leave the option away.'
+        )
+    motion = RecordedMotion(log, scenario, changes_of(log), live)
+    bus = inprocess_link(motion.session, files)
+    return bus, lambda progress: motion.run(bus, comparison, progress).final_state_sha256
 
 
 def _why(log: Log) -> str:

@@ -1,0 +1,111 @@
+"""One exchange after the other with the providers: they come, answer motion after motion, and leave.
+
+What is expensive but not urgent, the log above all, is done between posting a motion and the answer to it,
+while the providers compute.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from linkwind.bus.base import DynamicsLink
+from linkwind.dynamics.recorder import MessageLog
+from linkwind.errors import LostError, StoppedError
+from linkwind.log.state import TimingEncoder
+from linkwind.protocol import DynamicsSession, fault
+
+GOODBYE_TIMEOUT = 5.0  # s that a provider may take to commit the last state and say Bye
+
+
+class Exchanges:
+    """The providers of a run, behind a link; everything that is exchanged goes to the log."""
+
+    def __init__(self, session: DynamicsSession, link: DynamicsLink, log: MessageLog) -> None:
+        """Exchange over ``link``, an open end of the bus that answers control requests with ``session``."""
+        self._session, self._link, self._log = session, link, log
+        self._timing = TimingEncoder()
+
+    @contextmanager
+    def ended_for_all(self) -> Iterator[None]:
+        """Tell every provider why, if the block ends early.
+
+        Raises:
+            StoppedError: Ctrl-C or SIGTERM.
+        """
+        try:
+            yield
+        except KeyboardInterrupt:
+            stopped = StoppedError(f"stopped at {self._session.where()}")
+            self._link.fault(fault("dynamics", *self._session.motion.at, stopped))
+            raise stopped from None
+        except BaseException as error:
+            self._link.fault(fault("dynamics", *self._session.motion.at, error))
+            raise
+
+    def await_providers(self, timeout: float, poll: Callable[[], None]) -> None:
+        """Wait until every provider is ready.
+
+        Args:
+            timeout: [s].
+            poll: is called now and then; may raise to give up.
+
+        Raises:
+            LostError: a provider did not come.
+        """
+        session = self._session
+        if not self._link.wait(lambda: not session.not_ready, timeout, poll):
+            missing = " and ".join(f'"{name}"' for name in session.not_ready)
+            raise LostError(
+                f"{missing} did not come within {timeout:g} s (bus.start_timeout). Start it with: "
+                f"linkwind aero --connect ENDPOINT --name {session.not_ready[0]}"
+            )
+        self._log.diagnostics({p.name: p.diagnostics for p in session.participants.values()})
+
+    def ask(self, payload: bytes, meanwhile: Callable[[], None]) -> int:
+        """Send a motion that the session has, take every answer; return how long that took [ns].
+
+        Args:
+            payload: the motion.
+            meanwhile: is done while the providers compute.
+        """
+        session, link, log, time_ns = self._session, self._link, self._log, self._session.motion.time_ns
+        start = time.perf_counter_ns()
+        link.post(payload)
+        meanwhile()
+        log.motion(payload, time_ns)
+        while not session.answered:
+            provider, answer = link.receive()
+            if session.accept(provider, answer):
+                log.wrench(provider, answer, time_ns)
+        took = time.perf_counter_ns() - start
+        log.timing(self._timing.encode(session.motion.at[0], took), time_ns)
+        self._take_shown()
+        return took
+
+    def _take_shown(self) -> None:
+        """Write frames and checkpoints that came with the last answers: after all of these, in one order."""
+        for provider, payload in sorted(self._link.checkpoints(), key=lambda sent: sent[0]):
+            time_ns = self._session.checkpoint(provider, payload).time_ns
+            self._log.checkpoint(provider, payload, time_ns)
+        for provider, payload in sorted(self._link.frames(), key=lambda sent: sent[0]):
+            self._log.frame(provider, self._session.frame(provider, payload))
+
+    def say_goodbye(
+        self, payload: bytes, poll: Callable[[], None], meanwhile: Callable[[], None] = lambda: None
+    ) -> None:
+        """Send the last motion and wait for every Bye; see :meth:`ask`.
+
+        Raises:
+            LostError: a provider did not say it.
+        """
+        session = self._session
+        self._link.post(payload)
+        meanwhile()
+        self._log.motion(payload, session.motion.time_ns)
+        if not self._link.wait(lambda: not session.not_gone, GOODBYE_TIMEOUT, poll):
+            missing = " and ".join(f'"{name}"' for name in session.not_gone)
+            raise LostError(f"{missing} did not say Bye within {GOODBYE_TIMEOUT:g} s of the last step")
+        self._take_shown()
+        session.check_frames()

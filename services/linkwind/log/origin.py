@@ -1,0 +1,26 @@
+"""Where the run of a log comes from, for people, if not from its scenario alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from linkwind.log import contents
+from linkwind.log.reader import Log
+
+
+def origin(log: Log) -> Iterator[str]:
+    """Yield what there is to be said, a sentence each: nothing for a run from beginning to end."""
+    metadata = log.metadata
+    record = metadata.get(contents.RECORD)
+    if contents.RESUMED_STEP in metadata:
+        yield f"resumed after step {metadata[contents.RESUMED_STEP]} of run {metadata['resumed_run']}"
+    for step in log.changes:
+        yield f"other settings count after step {step}"
+    live = metadata.get(contents.SUBSTITUTED)
+    if live == contents.DYNAMICS:
+        yield f"live dynamics under the forces recorded in {record}"
+    elif live is not None:
+        yield (
+            f'"{live}" live against the motion recorded in {record}: wrenches are live ones, motion, joint '
+            "reactions and energies the recorded ones"
+        )

@@ -1,0 +1,78 @@
+"""Every provider of a run on this machine: as processes of their own, or in this one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from linkwind.bus.base import DynamicsLink
+from linkwind.errors import InputError
+from linkwind.protocol import DynamicsSession
+from linkwind.runs.children import children
+from linkwind.scenario import Scenario
+
+PORTS_TRIED = 5
+
+
+@contextmanager
+def providers_here(
+    session: DynamicsSession, scenario: Scenario, folder: Path, files: Mapping[str, Path]
+) -> Iterator[tuple[DynamicsLink, Callable[[], None]]]:
+    """Start the providers of a session, over the scenario's transport, and end them.
+
+    Args:
+        session: of the dynamics.
+        scenario: says how.
+        folder: for what the processes print.
+        files: of the providers whose model is made from a file, by name.
+
+    Yields:
+        The dynamics' end of the bus, to be closed; and what raises LostError once a process has ended with
+        an error.
+    """
+    if scenario.bus.transport == "inprocess":
+        yield inprocess_link(session, files), lambda: None
+        return
+    link, endpoint = _listen_here(session, scenario)
+    with children(folder) as providers:
+        for name in session.providers:
+            arguments = ["aero", "--connect", endpoint, "--name", name, "--run", session.run]
+            if name in files:
+                arguments += ["--force-fmu", str(files[name].resolve())]
+            providers.start(name, [*arguments, "--start-timeout", str(scenario.bus.start_timeout)])
+        yield link, providers.check
+
+
+def inprocess_link(session: DynamicsSession, files: Mapping[str, Path]) -> DynamicsLink:
+    """Return a bus whose providers are in this process."""
+    from linkwind.aero.service import session as provider_session
+    from linkwind.bus.inprocess import InProcessLink
+
+    return InProcessLink(session, [provider_session(name, files.get(name)) for name in session.providers])
+
+
+def zenoh_link(
+    session: DynamicsSession, scenario: Scenario, listen: Sequence[str], connect: Sequence[str]
+) -> DynamicsLink:
+    """Open the dynamics' end of a zenoh bus.
+
+    Raises:
+        InputError: an endpoint cannot be opened.
+    """
+    from linkwind.bus.zenoh import ZenohDynamicsLink
+
+    return ZenohDynamicsLink(session, listen, connect, scenario.coupling.timeout)
+
+
+def _listen_here(session: DynamicsSession, scenario: Scenario) -> tuple[DynamicsLink, str]:
+    """Open the dynamics' end on a free port of this machine; return it and its endpoint."""
+    from linkwind.bus.zenoh import loopback_endpoint
+
+    for _ in range(PORTS_TRIED):
+        endpoint = loopback_endpoint()
+        try:
+            return zenoh_link(session, scenario, [endpoint], []), endpoint
+        except InputError as error:  # somebody took the port between asking and listening
+            taken = error
+    raise taken

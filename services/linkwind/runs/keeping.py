@@ -1,0 +1,84 @@
+"""What a job leaves behind, however it ends: its log, closed with how it ended, and the report."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import Generic, TypeVar
+
+from linkwind.bus.base import DynamicsLink
+from linkwind.errors import LinkwindError
+from linkwind.log.writer import LogWriter
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Kept(Generic[T]):
+    """A job that is done, and its files.
+
+    Attributes:
+        result: of the job.
+        log: the MCAP file.
+        report: the HTML page.
+        report_trouble: why there is no page; empty if there is one.
+    """
+
+    result: T
+    log: Path
+    report: Path
+    report_trouble: str
+
+
+def keep(
+    folder: Path, link: DynamicsLink, new_log: Callable[[Path], LogWriter], job: Callable[[LogWriter], T]
+) -> Kept[T]:
+    """Do a job that writes a log, leave the bus, and write the report either way.
+
+    Args:
+        folder: for both files.
+        link: an open end of the bus; is closed.
+        new_log: makes the log.
+        job: writes it and closes it with how it ended; an error is recorded here.
+
+    Raises:
+        LinkwindError: the job's, with the places of the files.
+    """
+    log, report = folder / "log.mcap", folder / "report.html"
+    try:
+        with terminate_as_interrupt(), closing(link), new_log(log) as writer:
+            result = job(writer)
+    except LinkwindError as error:
+        if not log.exists():
+            raise
+        raise type(error)(f"{error}\nlog: {log}\nreport: {_report(log, report) or report}") from error
+    return Kept(result, log, report, _report(log, report))
+
+
+def _report(log: Path, report: Path) -> str:
+    """Write the report; return what went wrong, which must not hide how the run went."""
+    from linkwind.report import write_report
+
+    try:
+        write_report(log, report)
+    except LinkwindError as error:
+        return str(error)
+    return ""
+
+
+@contextmanager
+def terminate_as_interrupt() -> Iterator[None]:
+    """Let SIGTERM end the block the way Ctrl-C does, so that the log is closed and nobody is left waiting."""
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

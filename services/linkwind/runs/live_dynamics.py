@@ -1,0 +1,72 @@
+"""New dynamics under recorded forces: here, with changed settings, or elsewhere on the bus."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from pathlib import Path
+
+from linkwind.bus.inprocess import InProcessLink
+from linkwind.dynamics.service import DynamicsService
+from linkwind.log.contents import DYNAMICS
+from linkwind.log.reader import Log
+from linkwind.mechanism import build
+from linkwind.runs import folder as folders
+from linkwind.runs.recorded_forces import check_fits, recorded_session
+from linkwind.runs.run import Beginning, Outcome, Progress, drive
+from linkwind.runs.substitution import changed, metadata
+from linkwind.scenario import from_json
+
+
+def live_dynamics(log: Log, overrides: Sequence[str], out: Path | None, progress: Progress) -> Outcome:
+    """Run the dynamics of a log again under its recorded forces.
+
+    Args:
+        log: of the run; may be cut or damaged.
+        overrides: ``KEY=VALUE`` settings of the new dynamics.
+        out: folder for the results; None for a new one under ``runs/``.
+        progress: is told now and then how many steps are done.
+
+    Raises:
+        InputError: a setting is wrong, or the record does not fit it.
+        LinkwindError: the run ended early, where the record ends say; its log and report tell as well.
+    """
+    scenario, changes = changed(log, overrides)
+    check_fits(log, scenario)
+    service = DynamicsService(scenario, build(scenario), log.run, changes)
+    link = InProcessLink(service.session, [recorded_session(log, name) for name in log.provider_bodies])
+    folder = folders.create(scenario.name, out)
+    return drive(service, folder, progress, link, beginning=Beginning(metadata(log, DYNAMICS, changes)))
+
+
+def answer_dynamics(log: Log, listen: Sequence[str], connect: Sequence[str]) -> int:
+    """Take part in a run elsewhere, in the place of every provider, with the forces of a log.
+
+    Args:
+        log: of the run that the forces come from.
+        listen: zenoh endpoints to listen on.
+        connect: zenoh endpoints of the dynamics or a router.
+
+    Returns:
+        The last step that was answered.
+
+    Raises:
+        LostError: no dynamics came, or it went away.
+        FaultError, RefusedError: as they say.
+        InputError: the record does not fit the run.
+    """
+    from linkwind.aero.service import serve
+    from linkwind.bus.zenoh import ZenohProviderLink
+
+    timeout = from_json(log.scenario_json).bus.start_timeout
+
+    def answer(name: str) -> int:
+        provider = recorded_session(log, name)
+        with closing(ZenohProviderLink(connect, listen)) as link:
+            serve(link, provider, timeout)
+        return provider.at[0]
+
+    names = list(log.provider_bodies)
+    with ThreadPoolExecutor(len(names)) as pool:
+        return max(pool.map(answer, names))
