@@ -24,61 +24,30 @@ from linkwind.frames import FlowFrame
 from linkwind.log import contents, grid, tables
 from linkwind.log.chunks import MAGIC, ChannelInfo, Data, Message, chunk_records, messages_of
 from linkwind.log.facts import Damage, DecodedMessage, LogInfo, RawMessage
+from linkwind.log.head import Head
 from linkwind.log.scan import scan
 from linkwind.schema import MESSAGES
 
 
-class Log:
+class Log(Head):
     """One log file, open for reading; made by :func:`open_log`.
 
     Attributes:
-        path: of the file.
-        damage: what is missing, None for a file that is whole.
         topics: number of readable messages by topic.
         channels: by number, as in :meth:`messages`.
-        metadata: run id, schema hash and what the writer was given besides.
-        versions: of the programs that made the log, and the processor.
-        ending: how the run ended, as it was recorded; empty if the writer was killed.
     """
 
     def __init__(self, path: Path, data: Data) -> None:
-        self.path = path
         self._data = data
-        self._contents = scan(data)
-        self._check_origin()
+        super().__init__(path, scan(data))
         self.channels: dict[int, ChannelInfo] = dict(self._contents.channels)
         counts = self._counts()
         self.topics = {self.channels[number].topic: counts[number] for number in sorted(counts)}
-        self._check_schemas()
-        self.metadata = self.record(contents.RUN)
-        self.versions = self.record(contents.VERSIONS)
-        self.ending = self.record(contents.END)
-
-    def record(self, name: str) -> dict[str, str]:
-        """Return a metadata record, empty where there is none."""
-        return self._contents.metadata.get(name, {})
-
-    def _check_origin(self) -> None:
-        profile = self._contents.profile
-        if profile != contents.PROFILE and contents.RUN not in self._contents.metadata:
-            raise LogError(
-                f'{self.path}: header: expected profile "{contents.PROFILE}"; got "{profile}". '
-                "Another program wrote this MCAP file; give the log.mcap of a linkwind run."
-            )
-
-    def _check_schemas(self) -> None:
-        for topic, schema, _ in self.channels.values():
-            name = contents.message_name(topic)
-            if name is not None and schema.name != contents.PACKAGE + name:
-                raise LogError(
-                    f'{self.path}: {topic}: expected schema {contents.PACKAGE}{name}; got "{schema.name}". '
-                    "Read this log with the version of linkwind that wrote it."
-                )
+        self.check_schemas(self.channels.values())
 
     def _counts(self) -> dict[int, int]:
         """Return the readable messages by channel, and find out the damage."""
         gaps, written = self._contents.gaps, self._contents.counts
-        self.damage: Damage | None = None
         if not gaps and written is not None:
             return {number: count for number, count in written.items() if count}
         counts: dict[int, int] = {}
@@ -101,68 +70,6 @@ class Log:
             records = chunk_records(self._data, chunk, verified=self._contents.verified)
             if records is not None:  # they were read before
                 yield from messages_of(records, self.channels, wanted)
-
-    @property
-    def run(self) -> str:
-        """Id of the run."""
-        return self._known(self.metadata.get("run"), "the run id")
-
-    @property
-    def has_scenario(self) -> bool:
-        """Whether the scenario can be read."""
-        return contents.SCENARIO in self._contents.attachments
-
-    @property
-    def scenario_json(self) -> str:
-        """The resolved scenario."""
-        scenario = self._contents.attachments.get(contents.SCENARIO)
-        return self._known(None if scenario is None else scenario.decode(), "the scenario")
-
-    @property
-    def changes(self) -> dict[int, str]:
-        """Scenarios that a resumed run went on with, by the step after which each counts."""
-        changes = json.loads(self.metadata.get(contents.CHANGES, "{}"))
-        return {step: changes[str(step)] for step in sorted(map(int, changes))}
-
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        """Bodies in the order of the messages."""
-        return tuple(json.loads(self._known(self.metadata.get("bodies"), "the list of bodies")))
-
-    @property
-    def provider_bodies(self) -> dict[str, tuple[str, ...]]:
-        """Bodies of each provider, in the order of its WrenchStep."""
-        providers = json.loads(self._known(self.metadata.get("provider_bodies"), "the list of providers"))
-        return {name: tuple(bodies) for name, bodies in providers.items()}
-
-    @property
-    def diagnostics(self) -> dict[str, tuple[str, ...]]:
-        """Names of the numbers that each provider reports with its wrenches; those that have any."""
-        record = self.record(contents.DIAGNOSTICS)
-        return {provider: tuple(json.loads(names)) for provider, names in record.items()}
-
-    def _known(self, value: str | None, what: str) -> str:
-        if value is None:
-            text = self.damage.text if self.damage else "a log without it"
-            raise LogError(
-                f"{self.path}: expected {what} at the beginning; got {text}. Run the scenario again."
-            )
-        return value
-
-    @property
-    def complete(self) -> bool:
-        """Whether the run came to its end and every message of it can be read."""
-        return self.damage is None and self.ending.get("complete") == "true"
-
-    @property
-    def error(self) -> str | None:
-        """What ended the run early: class and text; None if nothing did or the writer was killed."""
-        return f"{self.ending['error']}: {self.ending['text']}" if "error" in self.ending else None
-
-    @property
-    def final_state_sha256(self) -> str | None:
-        """Of the last accepted state; None for a run without an end."""
-        return self.ending.get("final_state_sha256")
 
     @property
     def steps(self) -> int:
