@@ -53,16 +53,16 @@ def run_compiler(*arguments: object, cwd: Path) -> None:
 
 
 def compile_library(root: Path, target: Path) -> None:
-    """Compile ``fmu/core``, ``fmu/aero`` and ``fmu/flow`` into one shared library.
+    """Compile ``fmu/core``, ``fmu/baselines``, ``fmu/aero`` and ``fmu/flow`` into one shared library.
 
     The lattice is for vectors, which gcc makes of plain loops at -O3 only.
     """
     source = root / "fmu"
-    includes = [f"-I{source / folder}" for folder in ("core", "aero", "flow")]
+    includes = [f"-I{source / folder}" for folder in ("core", "baselines", "aero", "flow")]
     partial = target.with_name(target.name + ".partial")
     with tempfile.TemporaryDirectory() as folder:
         objects = Path(folder)
-        exact = [*sorted((source / "core").glob("*.c")), *sorted((source / "aero").glob("*.c"))]
+        exact = sorted(f for folder in ("core", "baselines", "aero") for f in (source / folder).glob("*.c"))
         run_compiler(*includes, "-c", *exact, cwd=objects)
         run_compiler(*includes, "-O3", "-c", *sorted((source / "flow").glob("*.c")), cwd=objects)
         run_compiler("-shared", "-o", partial, *sorted(objects.glob("*.o")), "-lm", cwd=objects)

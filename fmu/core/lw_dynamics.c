@@ -161,6 +161,7 @@ static void outward(const lw_multibody *mb, lw_link *l, double *joint_accelerati
 
 int lw_accelerations(lw_multibody *mb, const double *q, const double *v, const double *wrench,
                      double *joint_acceleration, lw_fault *fault) {
+    if (mb->formulation) return mb->formulation->accelerations(mb, q, v, wrench, joint_acceleration, fault);
     lw_kinematics(mb, q, v);
     for (int i = 0; i < mb->n; ++i) start(&mb->link[i], mb->gravity, wrench + 6 * mb->link[i].body);
     for (int i = mb->n - 1; i >= 0; --i) {

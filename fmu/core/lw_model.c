@@ -94,6 +94,7 @@ int lw_multibody_init(lw_multibody *mb, const lw_tables *t, lw_fault *fault) {
     mb->n = t->n;
     mb->nq = t->nq;
     mb->nv = t->nv;
+    mb->formulation = NULL;
     mb->gravity = lw_load3(t->gravity);
     lay_out(mb);
     memcpy(mb->stiffness, t->stiffness, (size_t)t->nv * sizeof(double));

@@ -46,8 +46,18 @@ typedef struct {
 
 enum { LW_MAX_STAGES = 7 };
 
+/* Another way to the accelerations than articulated bodies: see ../baselines. */
+typedef struct {
+    int (*accelerations)(lw_multibody *multibody, const double *q, const double *v, const double *wrench,
+                         double *joint_acceleration, lw_fault *fault);
+    int (*settle)(lw_multibody *multibody, double *q, double *v, lw_fault *fault); /* after every substep */
+    double (*spring_energy)(const lw_multibody *multibody, const double *q);
+    double (*damper_power)(const lw_multibody *multibody, const double *v);
+} lw_formulation;
+
 struct lw_multibody {
     int32_t n, nq, nv;
+    lw_formulation *formulation; /* NULL: articulated bodies */
     lw_vec3 gravity;
     lw_link *link; /* n, in topological order */
     double *stiffness, *damping, *rest;

@@ -50,6 +50,7 @@ typedef enum {
     LW_STATE_NOT_FINITE,     /* item: index in the state */
     LW_RESPONSE_NOT_FINITE,  /* item: body */
     LW_NOT_CONVERGED,        /* item: body whose affine wrench is not met */
+    LW_JOINT_OPEN,           /* item: body whose joint cannot be closed */
     /* arguments */
     LW_BAD_STEP = 20,
     LW_BAD_NODES,

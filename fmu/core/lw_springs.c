@@ -54,6 +54,7 @@ static double link_energy(const lw_multibody *mb, const lw_link *l, const double
 
 double lw_spring_energy(const lw_multibody *mb, const double *q) {
     double energy = 0.0;
+    if (mb->formulation) return mb->formulation->spring_energy(mb, q);
     for (int i = 0; i < mb->n; ++i)
         if (mb->link[i].sprung) energy += link_energy(mb, &mb->link[i], q);
     return energy;
@@ -61,6 +62,7 @@ double lw_spring_energy(const lw_multibody *mb, const double *q) {
 
 double lw_damper_power(const lw_multibody *mb, const double *v) {
     double power = 0.0;
+    if (mb->formulation) return mb->formulation->damper_power(mb, v);
     for (int i = 0; i < mb->n; ++i) {
         const lw_link *l = &mb->link[i];
         if (!l->damped) continue;

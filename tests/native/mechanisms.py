@@ -144,7 +144,7 @@ def matrix(quaternion) -> np.ndarray:
 
 def two_link() -> list[Body]:
     """The mechanism of the paper: two equal links, hinged at their ends, free in the plane."""
-    inertia = np.diag([0.0, 0.0, 1.4])
+    inertia = np.diag([0.7, 0.7, 1.4])
     return [
         Body(-1, "planar", 2.0, inertia),
         Body(0, "revolute", 2.0, inertia, (-0.25, 0.0, 0.0), (-0.25, 0.0, 0.0)),

@@ -53,6 +53,12 @@ WRONG = [
     ('"rk4"', '"ode45"',
      'dynamics.integrator: expected one of euler, semi_implicit_euler, rk4, dopri5; got "ode45". '
      'Use "dopri5".'),
+    ('integrator = "rk4"', 'method = "incremental"',
+     "dynamics.integrator: expected euler or semi_implicit_euler: the method incremental is of first order; "
+     'got "rk4". Use "semi_implicit_euler".'),
+    ('integrator = "rk4"', 'method = "cfe"\nstabilisation = "baumgarte"\nstabilisation_time = 1e-4',
+     "dynamics.stabilisation_time: expected at least an integrator step, 0.001 s: less would be unstable; "
+     "got 0.0001. Take ten steps or more."),
     ('model = "plate"', 'model = "lbm"',
      'aero.model: expected one of none, field, plate, flow, fmu; got "lbm". Use one of these.'),
     # types

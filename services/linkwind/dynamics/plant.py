@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from linkwind.coupling import Met
+from linkwind.dynamics.methods import multibody
 from linkwind.errors import SimulationError
 from linkwind.mechanism import Mechanism
-from linkwind.native.multibody import Integrator, Multibody
+from linkwind.native.multibody import Integrator
 from linkwind.scenario import Scenario
 from linkwind.spatial import Array, Motion
 
@@ -19,7 +20,7 @@ class State(NamedTuple):
     """A mechanism at a communication point.
 
     Attributes:
-        values: joint coordinates, joint velocities and the integrator's memory, shape (state_size,).
+        values: coordinates, velocities and the integrator's memory, shape (state_size,).
         external_work: done by the fluid since t_0 [J].
         dissipated_work: taken by joint dampers since t_0 [J].
     """
@@ -42,7 +43,7 @@ class MechanismPlant:
 
     def change(self, mechanism: Mechanism, scenario: Scenario) -> None:
         """Go on under the settings of another scenario with the same bodies, joints and steps."""
-        self.multibody = Multibody(mechanism.tables, mechanism.bodies)
+        self.multibody = multibody(mechanism, scenario)
         dynamics = scenario.dynamics
         self._how: dict[str, Any] = {
             "integrator": Integrator[dynamics.integrator.upper()],

@@ -51,7 +51,7 @@ class Recorder:
         self.log = log
         self.multibody = multibody
         self._step_ns = scenario.coupling.step_ns
-        self._state = StateEncoder(n, multibody.nq, multibody.nv)
+        self._state = StateEncoder(n, len(mechanism.q0), len(mechanism.v0))
         self._step = StepEncoder(scenario.coupling.order)
         self._accepted, self._accepted_twist = _motion_and_twist(n)
         self._trial, self._trial_twist = _motion_and_twist(n)
@@ -69,13 +69,13 @@ class Recorder:
         result = multibody.evaluate(values, point.wrench, point.added_inertia)
         kinetic, potential = multibody.energy(values)
         gap = multibody.joint_gap(self._accepted)
-        nq, nv = multibody.nq, multibody.nv
+        q, v = multibody.coordinates(values)
         payload = self._state.encode(
             point.step,
             time_ns,
             self._accepted,
-            q=values[:nq],
-            v=values[nq : nq + nv],
+            q=q,
+            v=v,
             acceleration=result.acceleration,
             reaction=result.reaction,
             wrench=result.total_wrench,

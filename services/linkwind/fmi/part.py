@@ -103,7 +103,13 @@ def dynamics_part(scenario: Scenario, *, native_arrays: bool) -> Part:
 
     Raises:
         MechanismError: the scenario's bodies and joints do not make a mechanism.
+        InputError: the scenario has another method than reduced.
     """
+    if scenario.dynamics.method != "reduced":
+        raise InputError(
+            f"{scenario.source}: dynamics.method: expected reduced, which is what an FMU computes; got "
+            f"{scenario.dynamics.method}. Export with --set dynamics.method=reduced."
+        )
     mechanism = build(scenario)
     tables = mechanism.tables
     n, nq, nv = len(mechanism.bodies), len(mechanism.q0), len(mechanism.v0)

@@ -28,6 +28,8 @@ _NUMERICS = {
     7: ("response of body {item}", "finite numbers", "NaN or infinity", "Check the force provider"),
     8: ("wrench on body {item}", "one that agrees with the twist it leads to", "none after ten corrections",
         "Take a smaller step"),
+    9: ("joint of body {item}", "a motion that keeps it closed", "none after ten corrections",
+        "Take a smaller step"),
 }  # fmt: skip
 _UNNAMED = (3, 6)  # the item is no body
 _ARGUMENTS = {

@@ -119,6 +119,10 @@ class Multibody:
             quaternion /= np.linalg.norm(quaternion)
         return state
 
+    def coordinates(self, state: Array) -> tuple[Array, Array]:
+        """Return the joint coordinates, shape (nq,), and velocities, shape (nv,), of a state."""
+        return state[: self.nq], state[self.nq : -1]
+
     def advance(
         self,
         state: Array,

@@ -42,6 +42,8 @@ def tiles(run: Run) -> str:
     coupling, dynamics = run.scenario["coupling"], run.scenario["dynamics"]
     times, digest = run.trajectory.t, run.final_state_sha256
     scheme, how = coupling["scheme"], dynamics["integrator"]
+    if dynamics["method"] != "reduced":
+        how = f"{dynamics['method']}, {how}"
     if scheme == "pec":
         scheme += f" {coupling['order']}"
         how += ", order adaptive" if coupling["adaptive"] else ", order fixed"

@@ -10,6 +10,7 @@ from typing import Any
 
 from linkwind import aero
 from linkwind.bus.base import DynamicsLink
+from linkwind.dynamics import methods
 from linkwind.dynamics.recorder import MessageLog, Recorder, tables_sha256
 from linkwind.dynamics.service import DynamicsService, Result
 from linkwind.errors import InputError, ScenarioError
@@ -99,6 +100,7 @@ def run(
         LinkwindError: the run ended early; its log and report tell as well.
     """
     mechanism = build(scenario)
+    methods.check(mechanism, scenario)
     aero.check(scenario)
     folder = folders.create(scenario.name, out)
     service = DynamicsService(scenario, mechanism, folders.run_id(folder))
@@ -137,6 +139,7 @@ def dynamics(
             'elsewhere; got "inprocess". Use: linkwind run'
         )
     mechanism = build(scenario)
+    methods.check(mechanism, scenario)
     aero.check(scenario)
     folder = folders.create(scenario.name, out)
     service = DynamicsService(scenario, mechanism, run_id or folders.run_id(folder))

@@ -19,7 +19,7 @@ def disagreements(scenario: Scenario) -> list[Problem]:
     repeated = list(_names(scenario))
     if repeated:
         return repeated  # what a name refers to is not known
-    problems = [*_end(scenario), *_inertias(scenario), *_joints(scenario)]
+    problems = [*_end(scenario), *_inertias(scenario), *_joints(scenario), *_method(scenario)]
     for index, provider in enumerate(scenario.providers):
         problems += _provider(scenario, provider, ("providers", index))
     return problems + list(_masses(scenario))
@@ -100,6 +100,20 @@ def _cycle(body: str, parents: dict[str, str]) -> list[str]:
         if way[-1] == body:
             return way
     return []
+
+
+def _method(scenario: Scenario) -> Iterator[Problem]:
+    dynamics = scenario.dynamics
+    if dynamics.method == "incremental" and dynamics.integrator not in ("euler", "semi_implicit_euler"):
+        expected = "euler or semi_implicit_euler: the method incremental is of first order"
+        path: Path = ("dynamics", "integrator")
+        yield Problem(path, expected, show(dynamics.integrator), 'Use "semi_implicit_euler".')
+    substep = scenario.coupling.step / dynamics.substeps
+    baumgarte = dynamics.method == "cfe" and dynamics.stabilisation == "baumgarte"
+    if baumgarte and dynamics.stabilisation_time < substep:
+        expected = f"at least an integrator step, {substep!r} s: less would be unstable"
+        got, advice = show(dynamics.stabilisation_time), "Take ten steps or more."
+        yield Problem(("dynamics", "stabilisation_time"), expected, got, advice)
 
 
 def _provider(scenario: Scenario, provider: Provider, path: Path) -> Iterator[Problem]:

@@ -10,7 +10,8 @@ from pydantic import Field, field_validator
 from linkwind.scenario.problems import ProblemError
 from linkwind.scenario.quantities import Section, Vector, quantity
 
-Method = Literal["reduced"]
+Method = Literal["reduced", "cfe", "incremental"]
+Stabilisation = Literal["none", "baumgarte", "projection"]
 IntegratorName = Literal["euler", "semi_implicit_euler", "rk4", "dopri5"]
 Scheme = Literal["explicit", "pec", "implicit"]
 Acceleration = Literal["aitken", "iqn_ils"]
@@ -54,7 +55,17 @@ class Environment(Section):
 class Dynamics(Section):
     """How the mechanism is advanced over a communication step."""
 
-    method: Method = Field(default="reduced", description="Formulation: reduced, in joint coordinates")
+    method: Method = Field(
+        default="reduced",
+        description="reduced: joint coordinates; to compare with: cfe, bodies with joints as forces between "
+        "them; incremental, the equations of Rahmati & Karimi 2021",
+    )
+    stabilisation: Stabilisation = Field(
+        default="projection", description="What cfe does about joints that drift open"
+    )
+    stabilisation_time: float = quantity(
+        "In which baumgarte undoes what a joint is open, as exp(-t/time)", "s", 0.05, gt=0.0
+    )
     integrator: IntegratorName = Field(default="rk4", description="Integrator")
     substeps: int = Field(
         default=1, ge=1, description="Integrator steps in a communication step (not for dopri5)"

@@ -1,0 +1,34 @@
+"""The methods by which a mechanism is advanced: the default, and those that it is compared with."""
+
+from __future__ import annotations
+
+from linkwind.errors import MechanismError
+from linkwind.mechanism import Mechanism
+from linkwind.native.cfe import Cfe, Stabilisation
+from linkwind.native.incremental import Incremental
+from linkwind.native.multibody import Multibody
+from linkwind.scenario import Scenario
+
+
+def check(mechanism: Mechanism, scenario: Scenario) -> None:
+    """Raise MechanismError if the method of the scenario cannot do the mechanism."""
+    multibody(mechanism, scenario)
+
+
+def multibody(mechanism: Mechanism, scenario: Scenario) -> Multibody:
+    """Return the mechanism, ready to move by the method of the scenario.
+
+    Raises:
+        MechanismError: the method cannot do this mechanism.
+    """
+    dynamics = scenario.dynamics
+    try:
+        if dynamics.method == "cfe":
+            stabilisation = Stabilisation[dynamics.stabilisation.upper()]
+            time = dynamics.stabilisation_time
+            return Cfe(mechanism.tables, mechanism.bodies, stabilisation=stabilisation, time=time)
+        if dynamics.method == "incremental":
+            return Incremental(mechanism.tables, mechanism.bodies)
+    except MechanismError as error:
+        raise MechanismError(f"{scenario.source}: dynamics.method: {error}") from error
+    return Multibody(mechanism.tables, mechanism.bodies)

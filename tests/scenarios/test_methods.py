@@ -1,0 +1,55 @@
+"""Whole runs by the methods that are there to be compared with, against the default one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from linkwind.errors import InputError, MechanismError
+from linkwind.fmi.part import dynamics_part
+from linkwind.log.reader import open_log
+from linkwind.runs.run import run
+from linkwind.runs.verify import scenario_of, verify
+from linkwind.scenario import load
+
+
+def fly(folder: Path, method: str, *settings: str):
+    """Fly the paper's case for 0.1 s; return the log."""
+    overrides = ["time.end=0.1", "bus.transport=inprocess", f"dynamics.method={method}", *settings]
+    return run(load("two_link", overrides), folder / method, lambda step: None).log
+
+
+@pytest.mark.parametrize(("scheme", "size"), [("pec", 1e-9), ("implicit", 1e-5)])
+@pytest.mark.parametrize(
+    ("method", "settings"),
+    [
+        ("cfe", ["dynamics.integrator=rk4"]),
+        ("cfe", ["dynamics.integrator=rk4", "dynamics.stabilisation=none"]),
+        ("incremental", ["dynamics.integrator=euler"]),
+    ],
+)
+def test_same_flight_in_the_log(tmp_path: Path, method: str, settings: list[str], scheme: str, size: float):
+    """Joint coordinates, reactions and energies too; ``implicit`` stops at a tolerance."""
+    settings = [*settings, f"coupling.scheme={scheme}"]
+    one, other = (open_log(fly(tmp_path, name, *settings)).trajectory() for name in ("reduced", method))
+    motion = "position", "linear", "angular", "q", "v", "acceleration", "reaction", "wrench"
+    for name in (*motion, "kinetic_energy", "potential_energy", "external_work"):
+        np.testing.assert_allclose(getattr(one, name), getattr(other, name), atol=size, err_msg=name)
+
+
+def test_verify_makes_it_again_bit_for_bit(tmp_path: Path):
+    assert verify(*scenario_of(fly(tmp_path, "cfe"))).identical
+
+
+def test_a_mechanism_that_the_paper_does_not_have(tmp_path: Path):
+    settings = ["dynamics.method=incremental", "dynamics.integrator=euler", "bus.transport=inprocess"]
+    with pytest.raises(MechanismError, match=r'^vortex_.*\.toml: dynamics\.method: joint of body "cylinder"'):
+        run(load("vortex_induced_vibration", settings), tmp_path / "out", lambda step: None)
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_fmu_is_of_the_default_method():
+    with pytest.raises(InputError, match=r"dynamics\.method: expected reduced, .* got cfe\. Export with"):
+        dynamics_part(load("two_link", ["dynamics.method=cfe"]), native_arrays=True)
