@@ -5,7 +5,9 @@ import pytest
 from foxglove.messages import Color, SceneEntity
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
+from linkwind.log import solids
 from linkwind.log.solids import solid, triangles
+from linkwind.scenario.pictures import pictures_of
 from linkwind.scenario.shapes import shape_of, signed_area
 
 GREY = Color(r=0.5, g=0.5, b=0.5, a=1.0)
@@ -20,13 +22,18 @@ KINDS = [
 ]
 
 
-def drawn(data, key):
-    """Return the one primitive of a shape, read back with Foxglove's own schema."""
-    entity, pool = SceneEntity(**solid(shape_of(data), 0.01, GREY)), descriptor_pool.DescriptorPool()
+def entity(primitives):
+    """Return primitives as an entity, read back with Foxglove's own schema."""
+    pool = descriptor_pool.DescriptorPool()
     for proto in descriptor_pb2.FileDescriptorSet.FromString(SceneEntity.get_schema().data).file:
         pool.Add(proto)
     cls = message_factory.GetMessageClass(pool.FindMessageTypeByName("foxglove.SceneEntity"))
-    message = cls.FromString(entity.encode())
+    return cls.FromString(SceneEntity(**primitives).encode())
+
+
+def drawn(data, key):
+    """Return the one primitive of a shape."""
+    message = entity(solid(shape_of(data), 0.01, GREY))
     assert [field.name for field, _ in message.ListFields()] == [key]
     (primitive,) = getattr(message, key)
     return primitive
@@ -64,3 +71,20 @@ def test_a_prism_is_closed_and_has_its_volume(data):
     corners = points[np.array(prism.indices).reshape(-1, 3)]
     volume = np.linalg.det(corners).sum() / 6.0
     assert volume == pytest.approx(signed_area(shape.outline()) * 0.4)
+
+
+def test_pictures_have_their_size_and_place():
+    lying = {"position": [0.0, 1.0, 0.0], "orientation": [2**-0.5, 2**-0.5, 0.0, 0.0]}  # its z is our -y
+    pictures = [
+        {"type": "box", "size": [1.0, 2.0, 3.0], "position": [4.0, 5.0, 6.0]},
+        {"type": "capsule", "diameter": 0.2, "length": 1.0} | lying,
+        {"type": "mesh", "file": "package://robot/arm.stl", "scale": [0.001, 0.001, 0.001]},
+    ]
+    message = entity(solids.drawn(pictures_of({"picture": pictures}), GREY))
+    (box,), (cylinder,), (mesh,) = message.cubes, message.cylinders, message.models
+    assert (box.size.x, box.size.y, box.size.z) == (1.0, 2.0, 3.0)
+    assert (box.pose.position.x, box.pose.position.y, box.pose.position.z) == (4.0, 5.0, 6.0)
+    assert (cylinder.size.x, cylinder.size.z, cylinder.pose.orientation.x) == (0.2, 1.0, 2**-0.5)
+    ends = sorted(ball.pose.position.y for ball in message.spheres)
+    assert ends == pytest.approx([0.5, 1.5])
+    assert (mesh.url, mesh.scale.x) == ("package://robot/arm.stl", 0.001)

@@ -10,7 +10,9 @@ from linkwind.errors import ScenarioError
 from linkwind.scenario import from_json, load, loads
 from tests.scenario.texts import SMALL, TWO_LINK, edited
 
-BODY_KEYS = "name, mass, inertia, shape, position, angle_deg, orientation, velocity, angular_velocity"
+BODY_KEYS = (
+    "name, mass, inertia, shape, picture, position, angle_deg, orientation, velocity, angular_velocity"
+)
 TOP_KEYS = (
     "name, description, time, environment, bodies, joints, providers, dynamics, coupling, bus, log, aero"
 )
@@ -119,7 +121,7 @@ WRONG = [
      "bodies[0].inertia: expected principal moments of which two add up to at least the third; "
      "got principal moments 1, 1, 3. No body has these: the largest is at most 2."),
     ("inertia = 1.4", "inertia = [1, 1, 1, 2, 0, 0]",
-     "bodies[0].inertia: expected a positive definite inertia; got principal moments -1, 1, 3. "
+     "bodies[0].inertia: expected an inertia without negative moments; got principal moments -1, 1, 3. "
      "No body has these; check signs and units."),
     ("inertia = 1.4", "inertia = [1, 1, 1, 0, 0, 0]",
      "bodies[1].inertia: expected 6 numbers, because link1 is 3-D; got 1.4. "
@@ -180,12 +182,40 @@ def test_a_wrong_input_gets_its_line(old, new, line):
 def test_zero_mass_needs_a_model_that_adds_inertia():
     text = edited("mass = 2.0", "mass = 0")
     assert loads(text, "x").bodies[0].mass == 0.0
+    assert loads(text, "x", ["aero.model=none"]).bodies[0].mass == 0.0  # it carries a body with mass
     with pytest.raises(ScenarioError) as error:
-        loads(text, "x", ["aero.model=none"])
+        loads(text, "x", ["aero.model=none", "joints=[]"])
     assert str(error.value) == (
         "x: bodies[0].mass: expected a number above 0 [kg], because no provider adds inertia to this body; "
         "got 0.0. Give it a mass, or the model plate or flow."
     )
+
+
+def test_a_rod_may_have_no_inertia_about_itself_if_something_holds_it():
+    rod = edited("inertia = 0.1", "inertia = [0, 0.1, 0.1, 0, 0, 0]", SMALL)
+    with pytest.raises(ScenarioError) as error:
+        loads(rod, "x")
+    assert str(error.value) == (
+        "x: bodies[0].inertia: expected principal moments above 0, because nothing holds or hangs on this "
+        "body; got [0.0, 0.1, 0.1, 0.0, 0.0, 0.0]. Correct it."
+    )
+    held = '[[joints]]\nname = "j"\ntype = "revolute"\nparent = "world"\nchild = "a"\n'
+    assert loads(f"{rod}\n{held}", "x").bodies[0].inertia[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("picture", "line"),
+    [
+        ('{ type = "ball" }', "type: expected one of box, ellipsoid, cylinder, capsule, mesh; got"),
+        ('{ type = "box", size = [0, 0, 0] }', "size: expected 3 numbers of at least 0, not all 0; got"),
+        ('{ type = "box", sice = [1, 1, 1] }', "sice: expected a key among position, orientation, size"),
+        ('{ type = "mesh" }', "file: expected a value"),
+    ],
+)  # fmt: skip
+def test_a_picture_is_checked(picture, line):
+    with pytest.raises(ScenarioError) as error:
+        loads(edited("inertia = 0.1", f"inertia = 0.1\npicture = [{picture}]", SMALL), "x")
+    assert str(error.value).startswith(f"x: bodies[0].picture[0].{line}")
 
 
 def test_a_flat_body_fulfils_the_triangle_inequality_with_equality():

@@ -85,11 +85,10 @@ def unknown(data, node, path=""):
                 continue
         entries = value if isinstance(value, list) else [value]
         target = resolve(inner, value.get("type") if isinstance(value, dict) else None)
-        if isinstance(value, list):
-            target = resolve(target.get("items", {}))
         for entry in entries:
             if isinstance(entry, dict):
-                yield from unknown(entry, target, f"{path}{key}.")
+                items = target.get("items", {}) if isinstance(value, list) else target
+                yield from unknown(entry, resolve(items, entry.get("type")), f"{path}{key}.")
 
 
 @pytest.mark.parametrize("name", [*sorted(BUILTIN), "template"])

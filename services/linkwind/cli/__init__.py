@@ -6,7 +6,19 @@ import sys
 
 import typer
 
-from linkwind.cli import fmu, logs, replay, report, resume, run, scenario, services, validate, verify
+from linkwind.cli import (
+    fmu,
+    logs,
+    mechanism,
+    replay,
+    report,
+    resume,
+    run,
+    scenario,
+    services,
+    validate,
+    verify,
+)
 from linkwind.errors import LinkwindError
 
 app = typer.Typer(
@@ -26,6 +38,7 @@ verify.register(app)
 replay.register(app)
 resume.register(app)
 fmu.register(app)
+mechanism.register(app)
 validate.register(app)
 
 

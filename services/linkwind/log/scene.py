@@ -24,8 +24,9 @@ from foxglove.messages import (
     Vector3,
 )
 
-from linkwind.log.solids import solid
-from linkwind.scenario.shapes import shape_of
+from linkwind.log.solids import drawn, solid
+from linkwind.scenario.pictures import Pictures, pictures_of
+from linkwind.scenario.shapes import AnyShape, shape_of
 from linkwind.spatial import Motion, Wrench
 
 FRAMES_PER_SECOND = 60.0
@@ -40,9 +41,9 @@ FORCE = Color(r=0.80, g=0.25, b=0.20, a=1.0)
 class Scene:
     """The picture of one scenario's bodies.
 
-    A body is the solid of its shape, or a ball without one; a joint is a small sphere at its point on the
-    child; a force is an arrow from the centre of mass, as long as the longest shape for the weight of the
-    heaviest body.
+    A body is its pictures, or else the solid of its shape, or else a ball; a joint is a small sphere at its
+    point on the child; a force is an arrow from the centre of mass, as long as the longest extent for the
+    weight of the heaviest body.
 
     Args:
         scenario: the resolved scenario as parsed JSON.
@@ -57,16 +58,21 @@ class Scene:
         self.stride = max(1, math.ceil(1.0 / (FRAMES_PER_SECOND * step)), math.ceil(steps / FRAMES_PER_RUN))
         self._names = [body["name"] for body in bodies]
         shapes = [shape_of(body.get("shape")) for body in bodies]
-        self._length = max((shape.reference_length for shape in shapes if shape), default=1.0)
+        pictures = [pictures_of(body) for body in bodies]
+        self._length = _length(shapes, pictures, scenario["joints"])
         weight = max(body["mass"] for body in bodies) * STANDARD_GRAVITY
         self._metres_per_newton = self._length / weight if weight > 0.0 else self._length
-        self._solids = [solid(shape, 0.02 * self._length, LINK) if shape else {} for shape in shapes]
-        self._balls: list[list[SpherePrimitive]] = [
-            [] if shape else [self._ball((0.0, 0.0, 0.0), 0.2, LINK)] for shape in shapes
-        ]
+        self._solids: list[dict[str, Any]] = []
+        for shape, drawn_ones in zip(shapes, pictures, strict=True):
+            if drawn_ones or shape is None:
+                self._solids.append(drawn(drawn_ones, LINK))
+            else:
+                self._solids.append({"spheres": [], **solid(shape, 0.02 * self._length, LINK)})
+            if shape is None and not drawn_ones:
+                self._solids[-1]["spheres"].append(self._ball((0.0, 0.0, 0.0), 0.2, LINK))
         for joint in scenario["joints"]:
             child = self._names.index(joint["child"])
-            self._balls[child].append(self._ball(joint["child_point"], 0.06, JOINT))
+            self._solids[child]["spheres"].append(self._ball(joint["child_point"], 0.06, JOINT))
 
     def _ball(self, point: Any, diameter: float, color: Color) -> SpherePrimitive:
         x, y, z = point
@@ -97,11 +103,8 @@ class Scene:
         for i, (position, force) in enumerate(states):
             name = self._names[i]
             entities.append(
-                SceneEntity(
-                    timestamp=stamp, frame_id=name, id=name, frame_locked=True,
-                    spheres=self._balls[i], **self._solids[i],
-                )
-            )  # fmt: skip
+                SceneEntity(timestamp=stamp, frame_id=name, id=name, frame_locked=True, **self._solids[i])
+            )
             arrows = self._arrows(position, force)
             entities.append(SceneEntity(timestamp=stamp, frame_id="world", id=f"{name} force", arrows=arrows))
         return SceneUpdate(entities=entities)
@@ -120,6 +123,14 @@ class Scene:
                 head_length=head, head_diameter=2.0 * thickness, color=FORCE,
             )
         ]  # fmt: skip
+
+
+def _length(shapes: list[AnyShape | None], pictures: list[Pictures], joints: list[dict[str, Any]]) -> float:
+    """Return the longest extent of what is drawn [m], by which balls and arrows are sized."""
+    extents = [shape.reference_length for shape in shapes if shape]
+    extents += [picture.extent for of_body in pictures for picture in of_body]
+    longest = max(extents, default=0.0) or max((math.hypot(*j["child_point"]) for j in joints), default=0.0)
+    return longest or 1.0
 
 
 def along(x: float, y: float, z: float) -> Quaternion:

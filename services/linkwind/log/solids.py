@@ -1,7 +1,8 @@
-"""The solid of a shape for Foxglove: a box, a cylinder, or triangles over any outline."""
+"""Solids for Foxglove: of a shape, a box, a cylinder or triangles over any outline; and pictures."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,13 +10,16 @@ from foxglove.messages import (
     Color,
     CubePrimitive,
     CylinderPrimitive,
+    ModelPrimitive,
     Point3,
     Pose,
     Quaternion,
+    SpherePrimitive,
     TriangleListPrimitive,
     Vector3,
 )
 
+from linkwind.scenario.pictures import Box, Capsule, Ellipsoid, Mesh, Pictures
 from linkwind.scenario.shapes import AnyShape, Circle, Ellipse, Plate, Rectangle
 from linkwind.spatial import Array
 
@@ -40,6 +44,44 @@ def solid(shape: AnyShape, thickness: float, color: Color) -> dict[str, Any]:
         cylinder = CylinderPrimitive(pose=ORIGIN, size=size, bottom_scale=1.0, top_scale=1.0, color=color)
         return {"cylinders": [cylinder]}
     return {"triangles": [_prism(shape.outline(), shape.span, color)]}
+
+
+def drawn(pictures: Pictures, color: Color) -> dict[str, list[Any]]:
+    """Return the primitives of a ``SceneEntity`` in the body frame, by the entity's keys."""
+    found: dict[str, list[Any]] = {"cubes": [], "spheres": [], "cylinders": [], "models": []}
+    for picture in pictures:
+        pose = _pose(picture.position, picture.orientation)
+        if isinstance(picture, Box):
+            found["cubes"].append(CubePrimitive(pose=pose, size=_size(*picture.size), color=color))
+        elif isinstance(picture, Ellipsoid):
+            found["spheres"].append(SpherePrimitive(pose=pose, size=_size(*picture.size), color=color))
+        elif isinstance(picture, Mesh):
+            scale = _size(*picture.scale)
+            model = ModelPrimitive(
+                pose=pose, scale=scale, color=color, override_color=False, url=picture.file
+            )
+            found["models"].append(model)
+        else:
+            d = picture.diameter
+            found["cylinders"].append(
+                CylinderPrimitive(
+                    pose=pose, size=_size(d, d, picture.length), bottom_scale=1.0, top_scale=1.0, color=color
+                )
+            )
+            for end in (-0.5, 0.5) if isinstance(picture, Capsule) else ():
+                at = np.array(picture.position) + end * picture.length * np.array(picture.axis)
+                ball = _pose(at.tolist(), (1.0, 0.0, 0.0, 0.0))
+                found["spheres"].append(SpherePrimitive(pose=ball, size=_size(d, d, d), color=color))
+    return found
+
+
+def _pose(position: Sequence[float], orientation: Sequence[float]) -> Pose:
+    (x, y, z), (qw, qx, qy, qz) = position, orientation
+    return Pose(position=Vector3(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))
+
+
+def _size(x: float, y: float, z: float) -> Vector3:
+    return Vector3(x=x, y=y, z=z)
 
 
 def _cube(x: float, y: float, z: float, color: Color) -> CubePrimitive:

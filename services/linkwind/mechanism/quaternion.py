@@ -63,3 +63,22 @@ def from_z(axis: Array) -> Array:
     turn = np.array([scalar, -y, x, 0.0])
     unit: Array = turn / math.hypot(*turn) + 0.0  # no -0.0
     return unit
+
+
+def from_matrix(rotation: Array) -> Array:
+    """Return the quaternion of a rotation matrix, shape (3, 3), its largest element positive.
+
+    Each row of ``four`` is the quaternion times 4 of its elements; the longest is the most accurate.
+    """
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    four = np.array(
+        [
+            [1 + a + e + i, h - f, c - g, d - b],
+            [h - f, 1 + a - e - i, b + d, c + g],
+            [c - g, b + d, 1 - a + e - i, f + h],
+            [d - b, c + g, f + h, 1 - a - e + i],
+        ]
+    )
+    row = four[np.argmax(np.diag(four))]
+    unit: Array = row / math.hypot(*row) + 0.0  # no -0.0
+    return unit

@@ -9,12 +9,12 @@ import numpy as np
 
 from linkwind.report.arrays import every_nth, pack
 from linkwind.report.data import Run
+from linkwind.report.wires import Line, wires
+from linkwind.scenario.pictures import pictures_of
 from linkwind.scenario.shapes import shape_of
 from linkwind.spatial import Array
 
 FRAMES = 1500
-
-Line = tuple[Array, bool]
 
 
 def scene(run: Run) -> dict[str, Any] | None:
@@ -51,7 +51,7 @@ def _body(run: Run, index: int) -> dict[str, Any]:
         "name": body["name"],
         "mass": max(body["mass"], 1e-12),  # weights of a mean, which must not all be 0
         "lines": [{"points": points.tolist(), "closed": closed} for points, closed in lines],
-        "thick": (body.get("shape") or {"type": "plate"})["type"] == "plate",
+        "thick": not body.get("picture") and (body.get("shape") or {"type": "plate"})["type"] == "plate",
         "reach": float(np.linalg.norm(points[:, : 2 if run.planar else 3], axis=1).max()),
     }
 
@@ -72,6 +72,9 @@ def _lines(body: Mapping[str, Any], joint_points: Array, planar: bool) -> list[L
 
     A plate is its rectangle; another shape its outline, in 3-D both faces and four edges between them.
     """
+    drawn = [line for picture in pictures_of(body) for line in wires(picture)]
+    if drawn:
+        return drawn
     shape = shape_of(body.get("shape"))
     if shape is None:
         return [_without_shape(body, joint_points)]
@@ -88,13 +91,15 @@ def _lines(body: Mapping[str, Any], joint_points: Array, planar: bool) -> list[L
 def _without_shape(body: Mapping[str, Any], joint_points: Array) -> Line:
     """Return a line through the joint points and the centre of mass.
 
-    Where these coincide it is a circle of the radius of gyration.
+    Where these coincide it is a circle of the radius of gyration, or a point if a mesh pictures it.
     """
     if joint_points.size and np.abs(joint_points).max() > 0.0:
         through = np.insert(joint_points, len(joint_points) // 2, 0.0, axis=0)
         if len(joint_points) == 1:
             through = np.vstack([joint_points[0], -joint_points[0]])  # as far beyond the centre of mass
         return through, False
+    if body.get("picture"):
+        return np.zeros((1, 3)), False
     inertia = body["inertia"]
     about_z = inertia if isinstance(inertia, float | int) else max(inertia[:3])
     radius = float(np.sqrt(about_z / max(body["mass"], 1e-12)))

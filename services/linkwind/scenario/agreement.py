@@ -6,10 +6,13 @@ from collections.abc import Iterator, Sequence
 from decimal import Decimal
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from linkwind.scenario.problems import Path, Problem, choice, show
 from linkwind.scenario.settings import nanoseconds
 
 if TYPE_CHECKING:
+    from linkwind.scenario.bodies import Body
     from linkwind.scenario.model import Scenario
     from linkwind.scenario.providers import Provider
 
@@ -186,11 +189,29 @@ def _first(names: Sequence[str]) -> str:
 
 
 def _masses(scenario: Scenario) -> Iterator[Problem]:
-    """A body without mass moves only if a model adds inertia to it."""
+    """A body moves only if it, a model or what hangs on it has inertia."""
     adding = [entry for entry in scenario.providers if entry.model in ("plate", "flow", "fmu")]
-    carried = {name for entry in adding for name in entry.bodies}
+    given = {name for entry in adding for name in entry.bodies}
+    parents = {joint.child: joint.parent for joint in scenario.joints}
+    for body in scenario.bodies:  # what carries mass has it
+        name = body.name if body.mass > 0.0 else "world"
+        while name != "world" and name not in given:
+            given.add(name)
+            name = parents.get(name, "world")
     for index, body in enumerate(scenario.bodies):
-        if body.mass == 0.0 and body.name not in carried:
+        if body.name not in given:
             expected = "a number above 0 [kg], because no provider adds inertia to this body"
             advice = "Give it a mass, or the model plate or flow."
             yield Problem(("bodies", index, "mass"), expected, show(body.mass), advice)
+        elif body.name not in {*parents, *parents.values()} and _spins_freely(body):
+            expected = "principal moments above 0, because nothing holds or hangs on this body"
+            yield Problem(("bodies", index, "inertia"), expected, show(body.inertia), "Correct it.")
+
+
+def _spins_freely(body: Body) -> bool:
+    """Return whether a body has no inertia about some axis."""
+    if isinstance(body.inertia, float):
+        return False
+    xx, yy, zz, xy, xz, yz = body.inertia
+    low, _, high = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return bool(low <= 1e-14 * high)

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, WithJsonSchema, field_validator, model_validator
 
+from linkwind.scenario.pictures import Pictures
 from linkwind.scenario.problems import Problem, ProblemError, show
 from linkwind.scenario.quantities import (
     Name,
@@ -39,9 +40,10 @@ def _inertia(value: Any) -> float | Inertia6:
     xx, yy, zz, xy, xz, yz = numbers(value, _INERTIA)
     principal = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).tolist()
     shown = "principal moments " + ", ".join(f"{moment:.6g}" for moment in principal)
-    if principal[0] <= 0.0:
+    # A rod has none about itself, a point mass none at all: the joint may keep them from spinning there.
+    if principal[0] < -1e-12 * principal[2]:
         advice = "No body has these; check signs and units."
-        raise ProblemError([Problem((), "a positive definite inertia", shown, advice)])
+        raise ProblemError([Problem((), "an inertia without negative moments", shown, advice)])
     # A flat body has equality, which round-off must not turn into an error.
     if principal[0] + principal[1] < principal[2] * (1.0 - 1e-9):
         advice = f"No body has these: the largest is at most {principal[0] + principal[1]:.6g}."
@@ -81,6 +83,9 @@ class Body(Section):
     )
     shape: Plate | Ellipse | Rectangle | Circle | Polygon | None = Field(
         default=None, discriminator="type", description="Shape, for force models and pictures"
+    )
+    picture: Pictures = Field(
+        default=(), strict=False, description="What is drawn in place of the shape; no force model sees it"
     )
     position: Vector | None = quantity("Position of the centre of mass at the start, in the world", "m", None)
     angle_deg: float | None = quantity(

@@ -72,10 +72,10 @@ def _problem(detail: ErrorDetails, path: Path, model: type[BaseModel]) -> Proble
         described = f" ({field.description})" if field else ""
         return Problem(path, f"a value{described}", "nothing", f"Add {path[-1]}.")
     if kind == "union_tag_not_found":
-        words = list(_kinds(field.annotation if field else None))
+        words = list(_kinds(_annotation(model, path)))
         return Problem((*path, "type"), f"one of {', '.join(words)}", "nothing", "Add type.")
     if kind == "union_tag_invalid":
-        words = list(_kinds(field.annotation if field else None))
+        words = list(_kinds(_annotation(model, path)))
         return choice((*path, "type"), "one of", words, detail["input"]["type"])
     if kind == "literal_error":
         words = re.findall(r"'([^']*)'", str(detail["ctx"]["expected"]))
@@ -137,23 +137,26 @@ def _field(model: type[BaseModel], path: Path) -> FieldInfo | None:
 
 def _model(model: type[BaseModel], path: Path) -> type[BaseModel] | None:
     """Return the model of the table at a path, which may name the kind of a table that has several."""
-    current: type[BaseModel] | None = model
+    return _plain(_annotation(model, path))
+
+
+def _annotation(model: type[BaseModel], path: Path) -> Any:
+    """Return the annotation of what is at a path."""
     annotation: Any = model
     for part in path:
-        kinds = _kinds(annotation)
-        if isinstance(part, str) and current is not None and part in current.model_fields:
-            annotation = current.model_fields[part].annotation
-            current = None if _kinds(annotation) else _plain(annotation)
+        kinds, owner = _kinds(annotation), _plain(annotation)
+        if isinstance(part, str) and owner is not None and part in owner.model_fields:
+            annotation = owner.model_fields[part].annotation
         elif part in kinds:
-            annotation = current = kinds[str(part)]
+            annotation = kinds[str(part)]
         else:  # an index into a list, or a name in a table of tables
-            current = _nested(annotation)
-    return current
+            annotation = _entry(annotation)
+    return annotation
 
 
 def _as_written(path: Path, model: type[BaseModel]) -> Path:
     """Return a path without the kinds that pydantic puts in: shape.plate.length is shape.length."""
-    kinds = [_kinds(getattr(_field(model, path[:at]), "annotation", None)) for at in range(len(path))]
+    kinds = [_kinds(_annotation(model, path[:at])) for at in range(len(path))]
     return tuple(part for part, known in zip(path, kinds, strict=True) if part not in known)
 
 
@@ -167,12 +170,14 @@ def _kinds(annotation: Any) -> dict[str, type[BaseModel]]:
 
 
 def _plain(annotation: Any) -> type[BaseModel] | None:
-    """Return the model that an annotation is, or is besides None."""
+    """Return the one model that an annotation is, or is besides None."""
     options = [annotation, *get_args(annotation)] if type(None) in get_args(annotation) else [annotation]
-    return next((part for part in options if isinstance(part, type) and issubclass(part, BaseModel)), None)
+    models = [part for part in options if isinstance(part, type) and issubclass(part, BaseModel)]
+    return models[0] if len(models) == 1 else None
 
 
-def _nested(annotation: Any) -> type[BaseModel] | None:
-    """Return the model that an annotation is a list or a table of."""
-    parts = get_args(annotation)
-    return next((part for part in parts if isinstance(part, type) and issubclass(part, BaseModel)), None)
+def _entry(annotation: Any) -> Any:
+    """Return the annotation of the entries of a list or a table."""
+    parts = [part for part in get_args(annotation) if part is not Ellipsis]
+    entry = parts[-1] if parts else None
+    return get_args(entry)[0] if hasattr(entry, "__metadata__") else entry  # a choice has its key with it

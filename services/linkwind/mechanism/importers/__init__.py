@@ -1,0 +1,88 @@
+"""Robots of other programs as scenarios: URDF and, compiled by MuJoCo, MJCF.
+
+Each importer reads a file into a ``Model``; ``settle`` makes a mechanism of it, ``text`` a scenario.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from linkwind import __version__
+from linkwind.errors import InputError, SimulationError
+from linkwind.mechanism import build
+from linkwind.mechanism.importers import mjcf, urdf, xmltree
+from linkwind.mechanism.importers.configuration import parse
+from linkwind.mechanism.importers.model import Model
+from linkwind.mechanism.importers.settle import settle
+from linkwind.mechanism.importers.text import scenario_text
+from linkwind.mechanism.remarks import Remark
+from linkwind.native.multibody import Multibody
+from linkwind.scenario import Scenario, loads
+
+__all__ = ["Imported", "import_file"]
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A file of another program as a scenario.
+
+    Attributes:
+        kind: URDF or MJCF.
+        text: the scenario as commented TOML.
+        scenario: what it says.
+        remarks: what was left out or changed.
+    """
+
+    kind: str
+    text: str
+    scenario: Scenario
+    remarks: tuple[Remark, ...]
+
+
+def import_file(
+    path: Path, base: urdf.Base | None = None, at: Sequence[str] = (), repair: bool = False
+) -> Imported:
+    """Return the scenario of a URDF or MJCF file.
+
+    Args:
+        path: the file.
+        base: of a URDF, whether its root link is fixed to the world (default) or free.
+        at: ``JOINT=VALUE`` for each joint that does not start at its zero [rad or m].
+        repair: whether inertias that no body can have are changed into ones that can be.
+
+    Raises:
+        InputError: the file cannot be read, something in it is wrong, or nothing in it can move.
+    """
+    model = _read(path, base)
+    settle(model, path, repair)
+    text = scenario_text(model, path.name, __version__, parse(at, model))
+    scenario = loads(text, str(path))
+    _refuse_singular(scenario, path)
+    return Imported(model.kind, text, scenario, tuple(model.remarks))
+
+
+def _read(path: Path, base: urdf.Base | None) -> Model:
+    root = xmltree.read(path)
+    if root.tag == "robot":
+        return urdf.read(root, base or "fixed")
+    if root.tag == "mujoco":
+        if base is not None:
+            raise InputError(f"--base {base}: expected it for URDF only; got {path}, an MJCF.")
+        return mjcf.read(path)
+    return root.refuse(
+        "<robot> (URDF) or <mujoco> (MJCF)", f"<{root.tag}>", "Convert the file to one of the two."
+    )
+
+
+def _refuse_singular(scenario: Scenario, path: Path) -> None:
+    """Find out before a run whether the mechanism can be moved at all."""
+    mechanism = build(scenario)
+    multibody = Multibody(mechanism.tables, mechanism.bodies)
+    try:
+        multibody.evaluate(multibody.initial_state(mechanism.q0, mechanism.v0), np.zeros((multibody.n, 6)))
+    except SimulationError as error:
+        raise InputError(f"{path}: {error}") from None
