@@ -7,9 +7,11 @@
     │   ├── ScenarioError                a scenario file, a key or an override
     │   ├── MechanismError               bodies and joints that do not make a mechanism
     │   ├── ExpressionError              a force-field expression
-    │   └── LogError                     a log file that is missing, damaged or foreign
+    │   ├── LogError                     a log file that is missing, damaged or foreign
+    │   └── CertificateError             certificates that are missing, expired or somebody else's
     ├── ParticipantError             4   a participant ended the run
     │   ├── RefusedError                 the dynamics refused a participant
+    │   ├── TrustError                   two machines do not trust each other: TLS, certificates
     │   ├── ProtocolError                a message that the lock-step protocol does not allow
     │   ├── LostError                    a participant died, stopped or never came
     │   ├── AnswerTimeoutError           a participant is alive but does not answer
@@ -54,6 +56,10 @@ class LogError(InputError):
     """A log file is missing, damaged or not one of linkwind's."""
 
 
+class CertificateError(InputError):
+    """Certificates are missing, expired or somebody else's."""
+
+
 class ParticipantError(LinkwindError):
     """A participant ended the run."""
 
@@ -62,6 +68,10 @@ class ParticipantError(LinkwindError):
 
 class RefusedError(ParticipantError):
     """The dynamics refused a participant."""
+
+
+class TrustError(ParticipantError):
+    """Two machines do not trust each other: no TLS on one side, or a certificate that the other rejects."""
 
 
 class ProtocolError(ParticipantError):

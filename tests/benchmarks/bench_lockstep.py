@@ -37,7 +37,7 @@ def _channel(session: zenoh.Session, out: str, into: str) -> tuple[zenoh.Publish
 
 def pong(endpoint: str) -> None:
     """Answer every ping with as many bytes as a wrench has, until one is empty."""
-    session = open_session([], [endpoint])
+    session = open_session([], [endpoint], "observer")
     publisher, subscriber = _channel(session, "bench/pong", "bench/ping")
     answer = bytes(WRENCH)
     publisher.put(answer)
@@ -57,7 +57,7 @@ def _receive(subscriber: Any, spin: float) -> bytes:
 def ping_pong(spin: float) -> float:
     """Return the wall clock of a bare exchange that looks for the answer for ``spin`` [s] [µs]."""
     endpoint = loopback_endpoint()
-    session = open_session([endpoint], [])
+    session = open_session([endpoint], [], "dynamics")
     publisher, subscriber = _channel(session, "bench/ping", "bench/pong")
     command = [sys.executable, "-c", f"from {__name__} import pong; pong('{endpoint}')"]
     with subprocess.Popen(command) as process:

@@ -53,7 +53,7 @@ def _replay(log: Path) -> dict[str, object]:
         if count == expected:
             everything.set()
 
-    with closing(open_session([], [endpoint])) as session:
+    with closing(open_session([], [endpoint], "observer")) as session:
         subscriber = session.declare_subscriber("linkwind/v1/**", take)
         done = replay(open_log(log), Selection(), listen=[endpoint], connect=[])
         assert everything.wait(10.0)

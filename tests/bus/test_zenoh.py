@@ -41,7 +41,7 @@ class Provider(threading.Thread):
 
     def run(self) -> None:
         endpoint, model, name, start_timeout = self._arguments
-        link = ZenohProviderLink([endpoint], [])
+        link = ZenohProviderLink([endpoint], [], name=name)
         try:
             serve(link, ProviderSession(name, lambda scenario, provider: model), start_timeout)
         except BaseException as error:
@@ -262,8 +262,8 @@ def test_nonsense_on_a_wrench_key_is_an_error_with_a_name(
     link = open_link(d)
     provider = Provider(endpoint, Slow())
     assert link.wait(lambda: not d.not_ready, 10.0, lambda: None)
-    stranger = ZenohProviderLink([endpoint], [])
-    stranger.join("r1", name)
+    stranger = ZenohProviderLink([endpoint], [], name=name)
+    stranger.join("r1")
     exchange(d, link, 0)
     link.post(d.post(1, 0))
     assert asked.wait(10.0)
@@ -286,7 +286,7 @@ def test_first_motion_is_sent_again_to_whoever_has_not_answered(
     early = Provider(endpoint, FakeModel(), "early")
     model = FakeModel()
     late = ProviderSession("late", lambda scenario, name: model)
-    slow = ZenohProviderLink([endpoint], [])
+    slow = ZenohProviderLink([endpoint], [], name="late")
     late.welcome(slow.request(late.hello(), 10.0))
     late.build()
     late.started(slow.request(late.ready(), 10.0))
@@ -294,7 +294,7 @@ def test_first_motion_is_sent_again_to_whoever_has_not_answered(
     link.post(d.post(0, 0))
     assert d.accept(*link.receive())
     assert d.unanswered == ["late"]
-    slow.join("r1", "late")
+    slow.join("r1")
     answering = threading.Thread(target=lambda: slow.reply(late.answer(slow.receive()) or b""))
     answering.start()
     while not d.answered:
@@ -341,9 +341,9 @@ def test_names_that_mean_something_in_a_key_are_refused(endpoint: str, name: str
         ZenohDynamicsLink(DynamicsSession(name, "{}", 1, 1, ["a"], {"aero": ["a"]}), [endpoint], [], 1.0)
     if name != "*":
         with pytest.raises(InputError, match="--run: expected letters"):
-            ZenohProviderLink([endpoint], [], name)
+            ZenohProviderLink([endpoint], [], name, name="aero")
 
 
 def test_endpoint_that_is_none_is_an_error_of_ours() -> None:
     with pytest.raises(InputError, match="zenoh: cannot connect to foo"):
-        ZenohProviderLink(["foo"], [])
+        ZenohProviderLink(["foo"], [], name="aero")

@@ -172,7 +172,7 @@ def test_dynamics_started_twice_is_refused_and_the_run_goes_on(programs: Program
 
 def test_other_schema_version_ends_the_run(programs: Programs) -> None:
     dynamics = programs.dynamics("bus.start_timeout=20")
-    link = ZenohProviderLink([programs.endpoint], [])
+    link = ZenohProviderLink([programs.endpoint], [], name="aero")
     hello = {"name": "aero", "schema_sha256": "0" * 64, "version": "0.0.1", "instance": "x"}
     reply = link.request(MESSAGES["Control"](hello=hello).SerializeToString(), PATIENCE)
     link.close()

@@ -50,6 +50,22 @@ def reason(reply: bytes) -> str:
     return str(Control.FromString(reply).refuse.reason)
 
 
+OTHERS = 'control: expected a message of "tail", by its key; got one of "aero"'
+
+
+def test_nobody_speaks_by_the_key_of_another() -> None:
+    d, p = dynamics(), provider()
+    for message in (
+        p.hello(),
+        Control(bye={"name": "aero"}).SerializeToString(),
+        p.fault(ProtocolError("x")),
+    ):
+        assert reason(d.control(message, "tail")) == OTHERS
+    assert d.failure is None
+    assert d.not_gone == ["aero"]
+    p.welcome(d.control(p.hello(), "aero"))
+
+
 def test_hand_shake_names_bodies_and_steps() -> None:
     d, p = dynamics(aero=["b"]), provider()
     welcome = Control.FromString(d.control(p.hello())).welcome

@@ -52,7 +52,7 @@ def over_zenoh(path: Path) -> Path:
     service = DynamicsService(scenario, build(scenario), "run")
     endpoint = loopback_endpoint()
     link: DynamicsLink = ZenohDynamicsLink(service.session, [endpoint], [], 5.0)
-    other = ZenohProviderLink([endpoint], [])
+    other = ZenohProviderLink([endpoint], [], name="aero")
     provider = ProviderSession("aero", lambda scenario, name: VortexModel(every=EVERY))
     thread = threading.Thread(target=serve, args=(other, provider, 10.0))
     writer = LogWriter(

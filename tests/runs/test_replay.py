@@ -52,7 +52,7 @@ class Subscriber:
         self.present: list[tuple[str, bool]] = []
         self.done, self.gone = threading.Event(), threading.Event()
         self._enough = enough
-        self.session = open_session([], [endpoint])
+        self.session = open_session([], [endpoint], "observer")
         self._presence = self.session.liveliness().declare_subscriber(
             "linkwind/v1/*/alive/*", self._on_presence, history=True
         )
@@ -133,7 +133,7 @@ def test_who_wants_to_take_part_is_refused(log: Path) -> None:
     endpoint = loopback_endpoint()
     with (
         closing(ZenohPlayer("out", {"/motion": "/motion"}, ["dynamics"], [endpoint], [])),
-        closing(ZenohProviderLink([endpoint], [])) as link,
+        closing(ZenohProviderLink([endpoint], [], name="aero")) as link,
     ):
         hello = MESSAGES["Control"](hello={"name": "aero"}).SerializeToString()
         reply = MESSAGES["Control"].FromString(link.request(hello, PATIENCE))

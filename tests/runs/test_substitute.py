@@ -142,7 +142,7 @@ def test_a_provider_from_elsewhere(log: Log, tmp_path: Path) -> None:
     endpoint = loopback_endpoint()
 
     def provider() -> None:
-        link = ZenohProviderLink([endpoint], [])
+        link = ZenohProviderLink([endpoint], [], name="aero")
         try:
             serve(link, session("aero"), 30.0)
         finally:

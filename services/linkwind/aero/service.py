@@ -42,6 +42,7 @@ def serve(link: ProviderLink, provider: ProviderSession, start_timeout: float) -
 
     Raises:
         RefusedError: the dynamics refuses this provider.
+        TrustError: the other side's TLS or certificate, or ours, will never do.
         LostError: no dynamics came, or it went away in the middle of the run.
         FaultError: somebody else ended the run.
         SimulationError: the force model failed (the dynamics has been told).
@@ -51,7 +52,7 @@ def serve(link: ProviderLink, provider: ProviderSession, start_timeout: float) -
     _log.info('"%s": takes part in run %s', provider.name, provider.run)
     try:
         provider.build()
-        link.join(provider.run, provider.name)
+        link.join(provider.run)
         provider.started(link.request(provider.ready(), start_timeout))
         while provider.state is not ProviderState.DONE:
             answer = provider.answer(link.receive())

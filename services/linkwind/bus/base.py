@@ -2,7 +2,8 @@
 
 A transport moves ``(key, bytes)`` and tells who is there; it knows no message but Fault. Keys are
 ``linkwind/v1/<run>/motion``, ``…/wrench/<provider>``, ``…/observe/flow/<provider>``,
-``…/observe/checkpoint/<provider>``, ``…/control``, ``…/fault`` and ``…/alive/<participant>``.
+``…/observe/checkpoint/<provider>``, ``…/control/<provider>``, ``…/refusal``, ``…/fault`` and
+``…/alive/<participant>``.
 """
 
 from __future__ import annotations
@@ -71,10 +72,11 @@ class ProviderLink(Protocol):
 
         Raises:
             LostError: nobody answered.
+            TrustError: the other side's TLS or certificate, or ours, will never do.
         """
         ...
 
-    def join(self, run: str, name: str) -> None:
+    def join(self, run: str) -> None:
         """Take part in ``run``: from now on motion messages come in."""
         ...
 

@@ -7,12 +7,14 @@ import sys
 import typer
 
 from linkwind.cli import (
+    certs,
     fmu,
     logs,
     mechanism,
     replay,
     report,
     resume,
+    router,
     run,
     scenario,
     services,
@@ -40,6 +42,8 @@ resume.register(app)
 fmu.register(app)
 mechanism.register(app)
 validate.register(app)
+certs.register(app)
+router.register(app)
 
 
 @app.callback(invoke_without_command=True)

@@ -28,4 +28,16 @@ ConnectOption = Annotated[
     list[str] | None,
     typer.Option("--connect", metavar="ENDPOINT", help="Connect there, such as tcp/10.0.0.2:7447."),
 ]
+TlsOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--tls", metavar="DIR", envvar="LINKWIND_TLS",
+        help="Mutual TLS with the certificates of this folder, made by linkwind certs; endpoints are tls/….",
+    ),
+]  # fmt: skip
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+
+
+def default_endpoint(tls: Path | None) -> str:
+    """Return where the participants meet on one machine if nothing else is said."""
+    return "tls/127.0.0.1:7447" if tls else "tcp/127.0.0.1:7447"

@@ -16,6 +16,8 @@ from linkwind.cli.options import (
     LogArgument,
     OutOption,
     SetOption,
+    TlsOption,
+    default_endpoint,
 )
 
 if TYPE_CHECKING:
@@ -54,6 +56,7 @@ def replay(
     set_: SetOption = None,
     force_fmu: ForceFmuOption = None,
     out: OutOption = None,
+    tls: TlsOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Publish the messages of a log as the run did, once somebody subscribes.
@@ -73,11 +76,12 @@ def replay(
     if substitute is not None:
         from linkwind.cli.substitute import substitute as put_in_place
 
-        put_in_place(log, substitute, set_ or [], force_fmu or [], out, listen or [], connect or [], as_json)
+        at = (listen or [], connect or [], tls)
+        put_in_place(log, substitute, set_ or [], force_fmu or [], out, *at, as_json)
         return
     if set_ or force_fmu or out:
         raise typer.BadParameter("expected --substitute with --set, --force-fmu and --out; got none")
-    from linkwind.cli.run import DEFAULT_ENDPOINT
+    from linkwind.credentials import identity_in
     from linkwind.log.reader import open_log
     from linkwind.runs.keeping import terminate_as_interrupt
     from linkwind.runs.replay import Selection, Steering
@@ -87,10 +91,11 @@ def replay(
     chosen = tuple(topic for text in topics or () for topic in text.split(","))
     selection = Selection(rate, start, end, chosen, loop)
     steering = Steering()
-    ends = {"listen": listen or ([] if connect else [DEFAULT_ENDPOINT]), "connect": connect or []}
+    ends = {"listen": listen or ([] if connect else [default_endpoint(tls)]), "connect": connect or []}
+    shown = identity_in(tls, "dynamics")
 
     def job(progress: Callable[[float], None]) -> Replayed:
-        return replay_log(opened, selection, **ends, progress=progress, steering=steering)
+        return replay_log(opened, selection, **ends, identity=shown, progress=progress, steering=steering)
 
     with terminate_as_interrupt():
         if opened.damage is not None:

@@ -17,6 +17,8 @@ from linkwind.cli.options import (
     OutOption,
     ScenarioArgument,
     SetOption,
+    TlsOption,
+    default_endpoint,
 )
 
 if TYPE_CHECKING:
@@ -24,8 +26,6 @@ if TYPE_CHECKING:
     from linkwind.scenario import Scenario
 
 T = TypeVar("T")
-
-DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 
 
 def register(app: typer.Typer) -> None:
@@ -39,6 +39,7 @@ def run(
     out: OutOption = None,
     set_: SetOption = None,
     force_fmu: ForceFmuOption = None,
+    tls: TlsOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Run a scenario: start every participant, exchange, log, report.
@@ -56,7 +57,7 @@ def run(
     else:
         loaded = load(scenario, set_ or [])
     refuse_missing(loaded, files)
-    _show(loaded, lambda progress: run_scenario(loaded, out, progress, files), as_json=as_json)
+    _show(loaded, lambda progress: run_scenario(loaded, out, progress, files, tls), as_json=as_json)
 
 
 def dynamics(
@@ -65,6 +66,7 @@ def dynamics(
     set_: SetOption = None,
     listen: ListenOption = None,
     connect: ConnectOption = None,
+    tls: TlsOption = None,
     run_id: Annotated[str, typer.Option("--run", help="Id of the run; the folder's name if not given.")] = "",
     as_json: JsonOption = False,
 ) -> None:
@@ -72,20 +74,23 @@ def dynamics(
 
     Example: linkwind dynamics two_link --listen tcp/0.0.0.0:7447
     """
+    from linkwind.credentials import identity_in
     from linkwind.runs.run import dynamics as run_dynamics
     from linkwind.scenario import load
 
     loaded = load(scenario, set_ or [])
+    shown = identity_in(tls, "dynamics")
     if not listen and not connect:
-        listen = [DEFAULT_ENDPOINT]
+        listen = [default_endpoint(tls)]
     if not as_json:
         for provider in loaded.providers:
             where = (listen or connect or [""])[0].replace("0.0.0.0", "THIS-MACHINE")
-            typer.echo(f"waiting for {provider.name}: linkwind aero --connect {where} --name {provider.name}")
+            options = f"--connect {where} --name {provider.name}" + (" --tls DIR" if tls else "")
+            typer.echo(f"waiting for {provider.name}: linkwind aero {options}")
     _show(
         loaded,
         lambda progress: run_dynamics(
-            loaded, out, progress, run_id=run_id, listen=listen or [], connect=connect or []
+            loaded, out, progress, run_id=run_id, listen=listen or [], connect=connect or [], identity=shown
         ),
         as_json=as_json,
     )

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import logging
 import time
+from contextlib import closing
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from linkwind.cli.options import ConnectOption, ListenOption
+from linkwind.cli.options import ConnectOption, ListenOption, TlsOption, default_endpoint
 from linkwind.errors import LinkwindError
+
+if TYPE_CHECKING:
+    from linkwind.bus.zenoh import ZenohProviderLink
+    from linkwind.protocol import ProviderSession
 
 PAUSE = (
     1.0  # s between two runs of a provider that stays, in which the dynamics of the last one leaves the bus
@@ -33,6 +39,7 @@ def aero(
     start_timeout: Annotated[
         float, typer.Option(min=0.0, help="Wait this long for the dynamics [s].")
     ] = 60.0,
+    tls: TlsOption = None,
     stay: Annotated[
         bool, typer.Option("--stay", help="Serve one run after the other, until told to stop.")
     ] = False,
@@ -41,17 +48,20 @@ def aero(
 
     Example: linkwind aero --connect tcp/10.0.0.2:7447
     """
-    from linkwind.cli.run import DEFAULT_ENDPOINT
+    from linkwind.aero.service import session
+    from linkwind.bus.zenoh import ZenohProviderLink
+    from linkwind.credentials import identity_in
     from linkwind.runs.keeping import terminate_as_interrupt
 
+    shown = identity_in(tls, name)
     if not connect and not listen:
-        connect = [DEFAULT_ENDPOINT]
+        connect = [default_endpoint(tls)]
     logging.basicConfig(level=logging.INFO, format="%(message)s")
-    endpoints = (connect or [], listen or [])
+    link = partial(ZenohProviderLink, connect or [], listen or [], run, name=name, identity=shown)
     with terminate_as_interrupt():
         while True:
             try:
-                _serve(endpoints, run, name, force_fmu, start_timeout)
+                _serve(link(), session(name, force_fmu), start_timeout)
             except LinkwindError as error:
                 if not stay:
                     raise
@@ -61,15 +71,9 @@ def aero(
             time.sleep(PAUSE)
 
 
-def _serve(
-    endpoints: tuple[list[str], list[str]], run: str, name: str, force_fmu: Path | None, start_timeout: float
-) -> None:
+def _serve(link: ZenohProviderLink, provider: ProviderSession, start_timeout: float) -> None:
     """Take part in one run."""
-    from linkwind.aero.service import serve, session
-    from linkwind.bus.zenoh import ZenohProviderLink
+    from linkwind.aero.service import serve
 
-    link = ZenohProviderLink(*endpoints, run)
-    try:
-        serve(link, session(name, force_fmu), start_timeout)
-    finally:
-        link.close()
+    with closing(link):
+        serve(link, provider, start_timeout)

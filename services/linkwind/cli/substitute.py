@@ -29,6 +29,7 @@ def substitute(
     out: Path | None,
     listen: Sequence[str],
     connect: Sequence[str],
+    tls: Path | None,
     as_json: bool,
 ) -> None:
     """Do what the options ask for and print what came of it.
@@ -41,6 +42,7 @@ def substitute(
         out: folder for the results.
         listen: endpoints to listen on.
         connect: endpoints to connect to.
+        tls: folder with the certificate of whoever is recorded; None without TLS.
         as_json: print one object.
 
     Raises:
@@ -57,9 +59,9 @@ def substitute(
     if log.damage is not None:
         typer.echo(f"note: the log is not complete: {log.damage.text}", err=True)
     if live != DYNAMICS:
-        _provider(log, live, overrides, given, out, listen, connect, as_json)
+        _provider(log, live, overrides, given, out, listen, connect, tls, as_json)
     elif listen or connect:
-        _answer(log, listen, connect, as_json)
+        _answer(log, listen, connect, tls, as_json)
     else:
         _dynamics(log, overrides, out, as_json)
 
@@ -84,7 +86,7 @@ def _dynamics(log: Log, overrides: Sequence[str], out: Path | None, as_json: boo
     show_diff(diff(log.path, outcome.log), 0.0)
 
 
-def _answer(log: Log, listen: Sequence[str], connect: Sequence[str], as_json: bool) -> None:
+def _answer(log: Log, listen: Sequence[str], connect: Sequence[str], tls: Path | None, as_json: bool) -> None:
     """Give the recorded forces to dynamics elsewhere."""
     from linkwind.runs.keeping import terminate_as_interrupt
     from linkwind.runs.live_dynamics import answer_dynamics
@@ -92,7 +94,7 @@ def _answer(log: Log, listen: Sequence[str], connect: Sequence[str], as_json: bo
     if not as_json:
         typer.echo(f"waiting for a dynamics at {', '.join([*listen, *connect])}")
     with terminate_as_interrupt():
-        last = answer_dynamics(log, listen, connect)
+        last = answer_dynamics(log, listen, connect, tls)
     typer.echo(json.dumps({"steps": last}) if as_json else f"answered up to step {last}, the last one")
 
 
@@ -104,6 +106,7 @@ def _provider(
     out: Path | None,
     listen: Sequence[str],
     connect: Sequence[str],
+    tls: Path | None,
     as_json: bool,
 ) -> None:
     """Ask a provider about the recorded motion; print how its forces differ from the recorded ones."""
@@ -127,7 +130,16 @@ def _provider(
 
     def job(progress: Silent) -> Kept[Answered]:
         return live_provider(
-            log, live, scenario, changes, out, progress, files=files, listen=listen, connect=connect
+            log,
+            live,
+            scenario,
+            changes,
+            out,
+            progress,
+            files=files,
+            listen=listen,
+            connect=connect,
+            tls=tls,
         )
 
     if as_json:

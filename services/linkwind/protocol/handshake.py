@@ -9,7 +9,7 @@ from typing import Any
 from linkwind import __version__
 from linkwind.errors import LinkwindError, ParticipantError, RefusedError
 from linkwind.messages import KINDS, WrenchMessage
-from linkwind.protocol.control import Control, fault_error, parse
+from linkwind.protocol.control import Control, fault_error, parse, refuse
 from linkwind.schema import SHA256
 from linkwind.spatial import Wrench
 
@@ -101,14 +101,33 @@ class HandShake:
             name: Participant(name, tuple(index[b] for b in on)) for name, on in providers.items()
         }
 
-    def control(self, request: bytes) -> bytes:
-        """Answer a control request of a provider; never raises, a wrong request is refused."""
+    def control(self, request: bytes, asker: str | None = None) -> bytes:
+        """Answer a control request of a provider; never raises, a wrong request is refused.
+
+        Args:
+            request: the message.
+            asker: the provider whose key it came by, which nobody else may use on a secure bus; None where
+                the transport knows who asks.
+        """
         try:
             message = parse(request, "hello", "ready", "bye", "fault")
+            self._check_asker(message, asker)
             reply = getattr(self, "_on_" + message.WhichOneof("body"))(message)
         except ParticipantError as error:
             reply = Control(refuse={"reason": str(error)})
         return bytes(reply.SerializeToString())
+
+    def refusal(self) -> bytes:
+        """Return the answer to somebody whose certificate gives no right to ask."""
+        names = ", ".join(self.participants) or "nobody"
+        return refuse(f"run {self.run}: expected the certificate of {names}; got another's")
+
+    @staticmethod
+    def _check_asker(message: Any, asker: str | None) -> None:
+        body = getattr(message, message.WhichOneof("body"))
+        name = body.participant if message.WhichOneof("body") == "fault" else body.name
+        if asker not in (None, name):
+            raise RefusedError(f'control: expected a message of "{asker}", by its key; got one of "{name}"')
 
     def _on_hello(self, message: Any) -> Any:
         hello = message.hello

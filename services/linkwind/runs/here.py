@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from linkwind.bus.base import DynamicsLink
+from linkwind.credentials import DYNAMICS, Identity, identity_in
 from linkwind.errors import InputError
 from linkwind.protocol import DynamicsSession
 from linkwind.runs.children import children
@@ -17,7 +18,11 @@ PORTS_TRIED = 5
 
 @contextmanager
 def providers_here(
-    session: DynamicsSession, scenario: Scenario, folder: Path, files: Mapping[str, Path]
+    session: DynamicsSession,
+    scenario: Scenario,
+    folder: Path,
+    files: Mapping[str, Path],
+    tls: Path | None = None,
 ) -> Iterator[tuple[DynamicsLink, Callable[[], None]]]:
     """Start the providers of a session, over the scenario's transport, and end them.
 
@@ -26,6 +31,7 @@ def providers_here(
         scenario: says how.
         folder: for what the processes print.
         files: of the providers whose model is made from a file, by name.
+        tls: folder with a certificate for each participant; None without TLS.
 
     Yields:
         The dynamics' end of the bus, to be closed; and what raises LostError once a process has ended with
@@ -34,10 +40,12 @@ def providers_here(
     if scenario.bus.transport == "inprocess":
         yield inprocess_link(session, files), lambda: None
         return
-    link, endpoint = _listen_here(session, scenario)
+    link, endpoint = _listen_here(session, scenario, tls)
     with children(folder) as providers:
         for name in session.providers:
             arguments = ["aero", "--connect", endpoint, "--name", name, "--run", session.run]
+            if tls:
+                arguments += ["--tls", str(tls)]
             if name in files:
                 arguments += ["--force-fmu", str(files[name].resolve())]
             providers.start(name, [*arguments, "--start-timeout", str(scenario.bus.start_timeout)])
@@ -53,7 +61,11 @@ def inprocess_link(session: DynamicsSession, files: Mapping[str, Path]) -> Dynam
 
 
 def zenoh_link(
-    session: DynamicsSession, scenario: Scenario, listen: Sequence[str], connect: Sequence[str]
+    session: DynamicsSession,
+    scenario: Scenario,
+    listen: Sequence[str],
+    connect: Sequence[str],
+    identity: Identity | None = None,
 ) -> DynamicsLink:
     """Open the dynamics' end of a zenoh bus.
 
@@ -62,17 +74,18 @@ def zenoh_link(
     """
     from linkwind.bus.zenoh import ZenohDynamicsLink
 
-    return ZenohDynamicsLink(session, listen, connect, scenario.coupling.timeout)
+    return ZenohDynamicsLink(session, listen, connect, scenario.coupling.timeout, identity)
 
 
-def _listen_here(session: DynamicsSession, scenario: Scenario) -> tuple[DynamicsLink, str]:
+def _listen_here(session: DynamicsSession, scenario: Scenario, tls: Path | None) -> tuple[DynamicsLink, str]:
     """Open the dynamics' end on a free port of this machine; return it and its endpoint."""
     from linkwind.bus.zenoh import loopback_endpoint
 
+    identity = identity_in(tls, DYNAMICS)
     for _ in range(PORTS_TRIED):
-        endpoint = loopback_endpoint()
+        endpoint = loopback_endpoint("tls" if tls else "tcp")
         try:
-            return zenoh_link(session, scenario, [endpoint], []), endpoint
+            return zenoh_link(session, scenario, [endpoint], [], identity), endpoint
         except InputError as error:  # somebody took the port between asking and listening
             taken = error
     raise taken

@@ -8,6 +8,7 @@ from contextlib import closing
 from pathlib import Path
 
 from linkwind.bus.inprocess import InProcessLink
+from linkwind.credentials import identity_in
 from linkwind.dynamics.service import DynamicsService
 from linkwind.log.contents import DYNAMICS
 from linkwind.log.reader import Log
@@ -40,13 +41,14 @@ def live_dynamics(log: Log, overrides: Sequence[str], out: Path | None, progress
     return drive(service, folder, progress, link, beginning=Beginning(metadata(log, DYNAMICS, changes)))
 
 
-def answer_dynamics(log: Log, listen: Sequence[str], connect: Sequence[str]) -> int:
+def answer_dynamics(log: Log, listen: Sequence[str], connect: Sequence[str], tls: Path | None = None) -> int:
     """Take part in a run elsewhere, in the place of every provider, with the forces of a log.
 
     Args:
         log: of the run that the forces come from.
         listen: zenoh endpoints to listen on.
         connect: zenoh endpoints of the dynamics or a router.
+        tls: folder with the certificate of each provider; None without TLS.
 
     Returns:
         The last step that was answered.
@@ -63,7 +65,8 @@ def answer_dynamics(log: Log, listen: Sequence[str], connect: Sequence[str]) -> 
 
     def answer(name: str) -> int:
         provider = recorded_session(log, name)
-        with closing(ZenohProviderLink(connect, listen)) as link:
+        link = ZenohProviderLink(connect, listen, name=name, identity=identity_in(tls, name))
+        with closing(link):
             serve(link, provider, timeout)
         return provider.at[0]
 

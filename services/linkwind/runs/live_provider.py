@@ -13,6 +13,7 @@ from types import MappingProxyType
 
 from linkwind import aero
 from linkwind.bus.base import DynamicsLink
+from linkwind.credentials import DYNAMICS, identity_in
 from linkwind.dynamics.exchanges import Exchanges
 from linkwind.dynamics.recorder import MessageLog, tables_sha256
 from linkwind.dynamics.service import digest
@@ -152,6 +153,7 @@ def live_provider(
     files: Mapping[str, Path] = MappingProxyType({}),
     listen: Sequence[str] = (),
     connect: Sequence[str] = (),
+    tls: Path | None = None,
 ) -> Kept[Answered]:
     """Ask a provider again about the motion of a log, with other settings, another model, another program.
 
@@ -165,6 +167,7 @@ def live_provider(
         files: of the provider, if its model is made from a file, by name.
         listen: zenoh endpoints to listen on, for a provider that comes from elsewhere.
         connect: zenoh endpoints to connect to, likewise; without any, the provider is started here.
+        tls: folder with a certificate for each participant here; None without TLS.
 
     Raises:
         InputError: a setting is wrong, or the record does not fit it.
@@ -196,6 +199,8 @@ def live_provider(
         return keep(folder, link, new_log, job)
 
     if listen or connect:
-        return asked(zenoh_link(recorded.session, scenario, listen, connect), lambda: None)
-    with providers_here(recorded.session, scenario, folder, files) as (link, poll):
+        return asked(
+            zenoh_link(recorded.session, scenario, listen, connect, identity_in(tls, DYNAMICS)), lambda: None
+        )
+    with providers_here(recorded.session, scenario, folder, files, tls) as (link, poll):
         return asked(link, poll)

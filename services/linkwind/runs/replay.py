@@ -10,6 +10,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
+from linkwind.credentials import Identity
 from linkwind.errors import InputError, LostError
 from linkwind.log.contents import FLOW, MOTION, WRENCH
 from linkwind.log.reader import Log
@@ -101,6 +102,7 @@ def replay(
     *,
     listen: Sequence[str],
     connect: Sequence[str],
+    identity: Identity | None = None,
     progress: Callable[[float], None] = lambda t: None,
     steering: Steering | None = None,
 ) -> Replayed:
@@ -111,6 +113,7 @@ def replay(
         selection: what of it, how fast.
         listen: zenoh endpoints to listen on.
         connect: zenoh endpoints to connect to.
+        identity: the dynamics' certificate; None without TLS.
         progress: is told now and then the simulation time [s].
         steering: pauses it; None for no pause.
 
@@ -125,7 +128,7 @@ def replay(
     timeout = from_json(log.scenario_json).bus.start_timeout
     participants = ["dynamics", *log.provider_bodies]
     keys = {topic: f"/observe{topic}" if topic.startswith(FLOW) else topic for topic in topics}
-    with closing(ZenohPlayer(log.run, keys, participants, listen, connect)) as player:
+    with closing(ZenohPlayer(log.run, keys, participants, listen, connect, identity)) as player:
         if not player.wait(timeout, GRACE):
             raise LostError(
                 f"nobody subscribed to linkwind/v1/{log.run}/** within {timeout:g} s. Start the subscriber, "

@@ -10,6 +10,7 @@ from typing import Any
 
 from linkwind import aero
 from linkwind.bus.base import DynamicsLink
+from linkwind.credentials import Identity
 from linkwind.dynamics import methods
 from linkwind.dynamics.recorder import MessageLog, Recorder, tables_sha256
 from linkwind.dynamics.service import DynamicsService, Result
@@ -87,6 +88,7 @@ def run(
     out: Path | None,
     progress: Progress,
     files: Mapping[str, Path] = MappingProxyType({}),
+    tls: Path | None = None,
 ) -> Outcome:
     """Run ``scenario`` with every provider on this machine.
 
@@ -95,6 +97,7 @@ def run(
         out: folder for the results; None for a new one under ``runs/``.
         progress: is told now and then how many steps are done.
         files: of the providers whose model is made from a file, by name.
+        tls: folder with a certificate for each participant; None without TLS.
 
     Raises:
         LinkwindError: the run ended early; its log and report tell as well.
@@ -104,7 +107,7 @@ def run(
     aero.check(scenario)
     folder = folders.create(scenario.name, out)
     service = DynamicsService(scenario, mechanism, folders.run_id(folder))
-    return with_providers(service, folder, progress, files)
+    return with_providers(service, folder, progress, files, tls=tls)
 
 
 def with_providers(
@@ -113,9 +116,10 @@ def with_providers(
     progress: Progress,
     files: Mapping[str, Path],
     beginning: Beginning = NEW,
+    tls: Path | None = None,
 ) -> Outcome:
     """Run a service with every provider on this machine; see :func:`run`."""
-    with providers_here(service.session, service.scenario, folder, files) as (link, poll):
+    with providers_here(service.session, service.scenario, folder, files, tls) as (link, poll):
         return drive(service, folder, progress, link, poll, beginning)
 
 
@@ -127,6 +131,7 @@ def dynamics(
     run_id: str,
     listen: Sequence[str],
     connect: Sequence[str],
+    identity: Identity | None = None,
 ) -> Outcome:
     """Run the dynamics alone; the providers come from elsewhere. See :func:`run`.
 
@@ -144,7 +149,7 @@ def dynamics(
     folder = folders.create(scenario.name, out)
     service = DynamicsService(scenario, mechanism, run_id or folders.run_id(folder))
     try:
-        link = zenoh_link(service.session, scenario, listen, connect)
+        link = zenoh_link(service.session, scenario, listen, connect, identity)
     except InputError:
         folder.rmdir()
         raise

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from linkwind.scenario.providers import Provider
 
 
+RESERVED = ("dynamics", "observer", "router", "ca")  # that a provider must not be called: names of roles
+
+
 def disagreements(scenario: Scenario) -> list[Problem]:
     """Return everything that does not fit together, in the order of the file."""
     repeated = list(_names(scenario))
@@ -120,7 +123,7 @@ def _method(scenario: Scenario) -> Iterator[Problem]:
 
 
 def _provider(scenario: Scenario, provider: Provider, path: Path) -> Iterator[Problem]:
-    if provider.name == "dynamics":
+    if provider.name in RESERVED:
         expected = "a name that no other participant has"
         yield Problem((*path, "name"), expected, show(provider.name), 'Choose another, such as "aero".')
     yield from _provider_bodies(scenario, provider, path)

@@ -7,14 +7,17 @@ who is there. Multicast, gossip and shared memory are off: endpoints are explici
 from linkwind.bus.zenoh.dynamics import SPIN, ZenohDynamicsLink
 from linkwind.bus.zenoh.player import ZenohPlayer
 from linkwind.bus.zenoh.provider import ZenohProviderLink
-from linkwind.bus.zenoh.session import LEASE, loopback_endpoint, open_session
+from linkwind.bus.zenoh.router import ZenohRouter
+from linkwind.bus.zenoh.session import LEASE, OBSERVER, loopback_endpoint, open_session
 
 __all__ = [
     "LEASE",
+    "OBSERVER",
     "SPIN",
     "ZenohDynamicsLink",
     "ZenohPlayer",
     "ZenohProviderLink",
+    "ZenohRouter",
     "loopback_endpoint",
     "open_session",
 ]

@@ -5,21 +5,24 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
 import zenoh
 from zenoh.handlers import FifoChannel
 
 from linkwind.bus.base import PREFIX
-from linkwind.bus.zenoh.endpoint import TICK, Endpoint
-from linkwind.bus.zenoh.session import LEASE, key_segment
+from linkwind.bus.zenoh.access import of_hub
+from linkwind.bus.zenoh.endpoint import Endpoint
+from linkwind.bus.zenoh.session import DYNAMICS, LEASE, Security, key_segment
+from linkwind.credentials import ROUTER, Identity
 from linkwind.errors import AnswerTimeoutError, LinkwindError, LostError
 
 # s that the dynamics looks for an answer before it sleeps: a processor that is awake answers two to four
 # times faster. Only one side may do so, and only if it does not take the other's processor away.
 SPIN = 200e-6 if len(os.sched_getaffinity(0)) > 1 else 0.0
 FRAMES = 64  # that may wait for the dynamics, which takes them at every exchange
+PAUSE = 0.005  # s between two looks while providers come and go
 FIRST_RESEND = 0.5  # s; the first motion may be lost while declarations still travel
 
 
@@ -29,8 +32,11 @@ class Exchanging(Protocol):
     run: str
     failure: LinkwindError | None
 
-    def control(self, request: bytes) -> bytes: ...
+    def control(self, request: bytes, asker: str) -> bytes: ...
+    def refusal(self) -> bytes: ...
     def where(self) -> str: ...
+    @property
+    def providers(self) -> Mapping[str, Sequence[str]]: ...
     @property
     def unanswered(self) -> Sequence[str]: ...
     @property
@@ -41,7 +47,12 @@ class ZenohDynamicsLink(Endpoint):
     """The dynamics' end."""
 
     def __init__(
-        self, session: Exchanging, listen: Sequence[str], connect: Sequence[str], timeout: float
+        self,
+        session: Exchanging,
+        listen: Sequence[str],
+        connect: Sequence[str],
+        timeout: float,
+        identity: Identity | None = None,
     ) -> None:
         """Open the bus and answer control requests from now on.
 
@@ -50,32 +61,42 @@ class ZenohDynamicsLink(Endpoint):
             listen: zenoh endpoints to listen on, such as ``tcp/127.0.0.1:7447``.
             connect: zenoh endpoints to connect to, such as a router's.
             timeout: [s] that a living provider may take to answer.
+            identity: what this end shows, and by whose authority it lets others in; None without TLS.
 
         Raises:
             InputError: an endpoint cannot be opened.
         """
         base = f"{PREFIX}/{key_segment(session.run, '--run')}"
-        super().__init__(listen, connect)
+        security = Security(identity, of_hub(session.providers, ROUTER)) if identity else None
+        super().__init__(listen, connect, DYNAMICS, security)
         self._exchanging = session
         self._timeout = timeout
         self._posted_at = float("inf")
         self._waiting_since = float("inf")
         self._first_motion = b""
         self._resend_at: float | None = None
-        self._changed = threading.Condition()
+        self._asking = threading.Lock()
         # Before the wrenches' own: whoever can send a wrench can send a frame.
         self._shown = self._session.declare_subscriber(f"{base}/observe/flow/*", FifoChannel(FRAMES))
         self._kept = self._session.declare_subscriber(f"{base}/observe/checkpoint/*", FifoChannel(FRAMES))
         self._join(f"{base}/wrench/*", f"{base}/motion", session.run, "dynamics")
-        self._control = self._session.declare_queryable(f"{base}/control", self._on_control, complete=True)
+        self._control = self._session.declare_queryable(f"{base}/control/*", self._on_control, complete=True)
+        # After the other: whoever has seen this one has seen that, too, unless it may not.
+        self._refusal = self._session.declare_queryable(f"{base}/refusal", self._on_refusal, complete=True)
 
     def _on_control(self, query: zenoh.Query) -> None:
-        with query, self._changed:
+        with query, self._asking:
             request = query.payload.to_bytes() if query.payload is not None else b""
-            query.reply(f"{PREFIX}/{self._exchanging.run}/control", self._exchanging.control(request))
+            asker = str(query.key_expr).rsplit("/", 1)[1]
+            reply = self._exchanging.control(request, asker)
+            if "*" not in asker:
+                query.reply(f"{PREFIX}/{self._exchanging.run}/control/{asker}", reply)
             if self._exchanging.failure is not None:
                 self._fail(self._exchanging.failure)
-            self._changed.notify_all()
+
+    def _on_refusal(self, query: zenoh.Query) -> None:
+        with query:
+            query.reply(f"{PREFIX}/{self._exchanging.run}/refusal", self._exchanging.refusal())
 
     def _seen(self, name: str, present: bool) -> None:
         if not present and name in self._exchanging.not_gone:
@@ -103,14 +124,15 @@ class ZenohDynamicsLink(Endpoint):
     def wait(self, done: Callable[[], bool], timeout: float, poll: Callable[[], None]) -> bool:
         """Wait until ``done`` holds; see :class:`linkwind.bus.base.DynamicsLink`."""
         end = time.monotonic() + timeout
-        with self._changed:
-            while not done():
-                if self._trouble is not None:
-                    raise self._trouble
-                if time.monotonic() > end:
-                    return False
-                self._changed.wait(TICK)
-                poll()
+        while not done():
+            if self._trouble is not None:
+                raise self._trouble
+            if time.monotonic() > end:
+                return False
+            # Not a condition variable: a signal in the middle of one leaves it in pieces.
+            time.sleep(PAUSE)
+            self._check_trust()
+            poll()
         return True
 
     def post(self, motion: bytes) -> None:

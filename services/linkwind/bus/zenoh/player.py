@@ -9,7 +9,9 @@ from typing import Any
 import zenoh
 
 from linkwind.bus.base import PREFIX
-from linkwind.bus.zenoh.session import open_session
+from linkwind.bus.zenoh.access import of_hub
+from linkwind.bus.zenoh.session import DYNAMICS, Security, open_session
+from linkwind.credentials import ROUTER, Identity
 from linkwind.protocol import refuse
 
 
@@ -23,6 +25,7 @@ class ZenohPlayer:
         participants: Sequence[str],
         listen: Sequence[str],
         connect: Sequence[str],
+        identity: Identity | None = None,
     ) -> None:
         """Open the bus and be there in the place of every participant.
 
@@ -32,15 +35,17 @@ class ZenohPlayer:
             participants: dynamics and providers.
             listen: zenoh endpoints to listen on.
             connect: zenoh endpoints to connect to.
+            identity: what this end shows; None without TLS.
 
         Raises:
             InputError: an endpoint cannot be opened.
         """
-        self._session = open_session(listen, connect)
+        security = Security(identity, of_hub(participants[1:], ROUTER)) if identity else None
+        self._session = open_session(listen, connect, DYNAMICS, security)
         base = f"{PREFIX}/{run}"
         refusal = refuse(f"run {run} is a replay; nobody can take part in it")
         self._control = self._session.declare_queryable(
-            f"{base}/control", lambda query: _reply(query, f"{base}/control", refusal), complete=True
+            f"{base}/control/*", lambda query: _refuse(query, base, refusal), complete=True
         )
         self._publishers = {
             topic: self._session.declare_publisher(
@@ -92,6 +97,6 @@ def _matching(publisher: zenoh.Publisher) -> bool:
     return bool(status.matching)
 
 
-def _reply(query: zenoh.Query, key: str, payload: bytes) -> None:
+def _refuse(query: zenoh.Query, base: str, refusal: bytes) -> None:
     with query:
-        query.reply(key, payload)
+        query.reply(f"{base}/control/{str(query.key_expr).rsplit('/', 1)[1]}", refusal)

@@ -9,8 +9,10 @@ from typing import Any
 import zenoh
 
 from linkwind.bus.base import PREFIX
+from linkwind.bus.zenoh.access import of_guest
 from linkwind.bus.zenoh.endpoint import Endpoint
-from linkwind.bus.zenoh.session import LEASE, key_segment
+from linkwind.bus.zenoh.session import LEASE, PROVIDER, Security, key_segment
+from linkwind.credentials import Identity
 from linkwind.errors import LostError, ParticipantError
 
 ANSWER = 5.0  # s for the answer to a request: a Welcome may carry the memory of a large model
@@ -19,17 +21,27 @@ ANSWER = 5.0  # s for the answer to a request: a Welcome may carry the memory of
 class ZenohProviderLink(Endpoint):
     """A provider's end."""
 
-    def __init__(self, connect: Sequence[str], listen: Sequence[str], run: str = "*") -> None:
+    def __init__(
+        self,
+        connect: Sequence[str],
+        listen: Sequence[str],
+        run: str = "*",
+        *,
+        name: str,
+        identity: Identity | None = None,
+    ) -> None:
         """Open the bus; nothing needs to be listening there yet.
 
         Args:
             connect: zenoh endpoints of the dynamics or a router.
             listen: zenoh endpoints to listen on.
             run: id of the run to take part in, ``*`` for the only one that is there.
+            name: of the provider.
+            identity: what this end shows; None without TLS.
         """
         self._run = run if run == "*" else key_segment(run, "--run")
-        super().__init__(listen, connect)
-        self._connect = connect
+        self._name = key_segment(name, "--name")
+        super().__init__(listen, connect, PROVIDER, Security(identity, of_guest()) if identity else None)
         self._dynamics_seen = False
         self._joined_at = float("inf")
 
@@ -37,33 +49,39 @@ class ZenohProviderLink(Endpoint):
         """Send a control request and return the answer; see :class:`~linkwind.bus.base.ProviderLink`."""
         end = time.monotonic() + timeout
         while time.monotonic() < end:
-            replies = [r for r in self._ask(payload, min(ANSWER, timeout)) if r.ok is not None]
+            key = f"control/{self._name}"
+            # Nobody answers, but there is a dynamics: it may have come this moment, or we may not ask it.
+            replies = self._ask(key, payload, min(ANSWER, timeout)) or (
+                self._ask("refusal", b"", 1.0)
+                and (self._ask(key, payload, min(ANSWER, timeout)) or self._ask("refusal", b"", 1.0))
+            )
             if len(replies) > 1:
                 runs = ", ".join(sorted(str(r.ok.key_expr).split("/")[2] for r in replies))
                 raise ParticipantError(f"expected one dynamics; got runs {runs}. Choose one with --run")
             if replies:
                 return bytes(replies[0].ok.payload.to_bytes())
-            self._closing.wait(0.02)
+            self._check_trust()
+            time.sleep(0.02)
         where = ", ".join(self._connect) or "any endpoint"
         raise LostError(
             f"no dynamics answered at {where} within {timeout:g} s. Is it running and listening there? "
             "Start it with: linkwind dynamics SCENARIO --listen ENDPOINT"
         )
 
-    def _ask(self, payload: bytes, timeout: float) -> list[Any]:
+    def _ask(self, key: str, payload: bytes, timeout: float) -> list[Any]:
         replies = self._session.get(
-            f"{PREFIX}/{self._run}/control",
+            f"{PREFIX}/{self._run}/{key}",
             payload=payload,
             timeout=timeout,
             consolidation=zenoh.ConsolidationMode.NONE,
         )
-        return list(replies)
+        return [reply for reply in replies if reply.ok is not None]
 
-    def join(self, run: str, name: str) -> None:
+    def join(self, run: str) -> None:
         """Take part in ``run``: from now on motion messages come in."""
         self._run = key_segment(run, "--run")
         self._joined_at = time.monotonic()
-        base, name = f"{PREFIX}/{run}", key_segment(name, "--name")
+        base, name = f"{PREFIX}/{run}", self._name
         self._frames, self._checkpoints = (
             self._session.declare_publisher(
                 f"{base}/observe/{kind}/{name}", congestion_control=zenoh.CongestionControl.BLOCK

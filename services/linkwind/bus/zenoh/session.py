@@ -7,25 +7,84 @@ import os
 import re
 import socket
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import zenoh
 
+from linkwind.credentials import Identity
 from linkwind.errors import InputError
 
+# Of participants, as a router tells them apart: it passes on what goes from one region to another.
+DYNAMICS, PROVIDER, OBSERVER = REGIONS = ("dynamics", "provider", "observer")
 LEASE = 1.0  # s without a sign of life after which a participant counts as lost
 
 # One runtime for everything: a third less time a round trip than zenoh's separate receive threads.
 os.environ.setdefault("ZENOH_RUNTIME", "(rx: (handover: app), acc: (handover: app), tx: (handover: app))")
 
 
-def open_session(listen: Sequence[str], connect: Sequence[str]) -> zenoh.Session:
+@dataclass(frozen=True)
+class Security:
+    """What makes a bus secure.
+
+    Attributes:
+        identity: what this end shows.
+        access: what others may do, as zenoh's access control.
+    """
+
+    identity: Identity
+    access: dict[str, Any]
+
+    def settings(self) -> dict[str, Any]:
+        """Return it as zenoh takes it: TLS on both sides and nothing else."""
+        identity = self.identity
+        return {
+            "transport/link/protocols": ["tls"],
+            "transport/link/tls": {
+                "root_ca_certificate": str(identity.ca),
+                "listen_certificate": str(identity.certificate),
+                "listen_private_key": str(identity.key),
+                "connect_certificate": str(identity.certificate),
+                "connect_private_key": str(identity.key),
+                "enable_mtls": True,
+                "verify_name_on_connect": True,
+                "close_link_on_expiration": True,
+            },
+            "access_control": self.access,
+        }
+
+
+def open_session(
+    listen: Sequence[str], connect: Sequence[str], region: str, security: Security | None = None
+) -> zenoh.Session:
     """Open zenoh with linkwind's settings, on and to these endpoints.
 
+    Args:
+        listen: endpoints such as ``tcp/127.0.0.1:7447``, ``tls/…`` with ``security``.
+        connect: likewise.
+        region: what kind of participant this is, for a router.
+        security: certificates and rules; None for a network that can be trusted.
+
     Raises:
-        InputError: an endpoint cannot be opened.
+        InputError: an endpoint cannot be opened, or is of the wrong kind.
     """
+    return _open(listen, connect, security, {"mode": "peer", "region_name": region})
+
+
+def open_router(
+    listen: Sequence[str], connect: Sequence[str], security: Security | None = None
+) -> zenoh.Session:
+    """Open what only passes messages on, between participants that need not reach each other."""
+    regions = [{"filters": [{"region_names": [region]}]} for region in REGIONS]
+    return _open(listen, connect, security, {"mode": "router", "gateway": {"south": regions}})
+
+
+def _open(
+    listen: Sequence[str], connect: Sequence[str], security: Security | None, place: dict[str, Any]
+) -> zenoh.Session:
+    _check_kind([*listen, *connect], security)
     settings = {
-        "mode": "peer",
+        **place,
         "listen/endpoints": list(listen),
         "connect/endpoints": list(connect),
         "connect/retry": {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 2},
@@ -36,6 +95,7 @@ def open_session(listen: Sequence[str], connect: Sequence[str]) -> zenoh.Session
         "transport/unicast/open_timeout": int(LEASE * 1000),
         "transport/link/tx/lease": int(LEASE * 1000),
         "transport/link/tx/keep_alive": 4,
+        **(security.settings() if security else {}),
     }
     try:
         config = zenoh.Config()
@@ -51,6 +111,16 @@ def open_session(listen: Sequence[str], connect: Sequence[str]) -> zenoh.Session
         ) from error
 
 
+def _check_kind(endpoints: Sequence[str], security: Security | None) -> None:
+    """Raise InputError unless all endpoints are of TLS, or none is."""
+    for endpoint in endpoints:
+        if endpoint.startswith("tls/") != (security is not None):
+            expected = "an endpoint with TLS, such as tls/10.0.0.2:7447, because of --tls"
+            if security is None:
+                expected = "--tls DIR (or LINKWIND_TLS) with this endpoint, which has TLS"
+            raise InputError(f"{endpoint}: expected {expected}")
+
+
 def key_segment(value: str, what: str) -> str:
     """Return ``value`` if it may stand in a bus key.
 
@@ -62,8 +132,8 @@ def key_segment(value: str, what: str) -> str:
     return value
 
 
-def loopback_endpoint() -> str:
+def loopback_endpoint(protocol: str = "tcp") -> str:
     """Return an endpoint of this machine that nobody listens on now."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+        return f"{protocol}/127.0.0.1:{probe.getsockname()[1]}"
