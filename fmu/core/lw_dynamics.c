@@ -5,6 +5,8 @@
  */
 #include "lw_model.h"
 
+#include <string.h>
+
 /* A pivot below this fraction of the terms it is the difference of holds round-off only. */
 static const double pivot_tolerance = 1.5e-14;
 
@@ -143,8 +145,7 @@ static int inward(lw_multibody *mb, lw_link *l, const double *q, const double *v
 
 /* ---- from the roots to the leaves ---- */
 
-static void outward(const lw_multibody *mb, lw_link *l, double *joint_acceleration) {
-    lw_spatial a = l->bias;
+static void outward(const lw_multibody *mb, lw_link *l, lw_spatial a, double *joint_acceleration) {
     if (l->parent >= 0) {
         lw_spatial base = mb->link[l->parent].acceleration;
         a.angular = lw_add(a.angular, base.angular);
@@ -159,9 +160,14 @@ static void outward(const lw_multibody *mb, lw_link *l, double *joint_accelerati
     l->acceleration = a;
 }
 
-int lw_accelerations(lw_multibody *mb, const double *q, const double *v, const double *wrench,
-                     double *joint_acceleration, lw_fault *fault) {
-    if (mb->formulation) return mb->formulation->accelerations(mb, q, v, wrench, joint_acceleration, fault);
+void lw_outward(lw_multibody *mb, int with_bias, double *joint_acceleration) {
+    static const lw_spatial none = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+    for (int i = 0; i < mb->n; ++i)
+        outward(mb, &mb->link[i], with_bias ? mb->link[i].bias : none, joint_acceleration);
+}
+
+int lw_tree_accelerations(lw_multibody *mb, const double *q, const double *v, const double *wrench,
+                          double *joint_acceleration, lw_fault *fault) {
     lw_kinematics(mb, q, v);
     for (int i = 0; i < mb->n; ++i) start(&mb->link[i], mb->gravity, wrench + 6 * mb->link[i].body);
     for (int i = mb->n - 1; i >= 0; --i) {
@@ -169,8 +175,16 @@ int lw_accelerations(lw_multibody *mb, const double *q, const double *v, const d
         fault->item = mb->link[i].body;
         if (status) return status;
     }
-    for (int i = 0; i < mb->n; ++i) outward(mb, &mb->link[i], joint_acceleration);
+    lw_outward(mb, 1, joint_acceleration);
     return LW_OK;
+}
+
+int lw_accelerations(lw_multibody *mb, const double *q, const double *v, const double *wrench,
+                     double *joint_acceleration, lw_fault *fault) {
+    if (mb->formulation) return mb->formulation->accelerations(mb, q, v, wrench, joint_acceleration, fault);
+    int status = lw_tree_accelerations(mb, q, v, wrench, joint_acceleration, fault);
+    if (!status && mb->rows) lw_delassus_close(mb, joint_acceleration);
+    return status;
 }
 
 /* ---- with the added inertia ---- */
@@ -210,22 +224,30 @@ static void store6(double *p, lw_spatial s) {
     lw_store3(p + 3, s.angular);
 }
 
+/* Put the closures' forces among the wrenches, so that the joints of the tree are seen to transmit them. */
+static int load_closures(lw_multibody *mb, const double *state, const double *wrench, const lw_evaluation *e,
+                         lw_fault *fault) {
+    memcpy(mb->wrench, wrench, 6 * (size_t)mb->n * sizeof(double));
+    lw_closure_forces(mb, mb->wrench, e->closure_reaction);
+    return lw_tree_accelerations(mb, state, state + mb->nq, mb->wrench, e->joint_acceleration, fault);
+}
+
 int lw_multibody_evaluate(lw_multibody *mb, const double *state, const double *wrench,
-                          const double *added_inertia, double *joint_acceleration, double *acceleration,
-                          double *reaction, double *total_wrench, lw_fault *fault) {
+                          const double *added_inertia, const lw_evaluation *e, lw_fault *fault) {
     int status = lw_inputs_check(mb, state, 1, wrench, added_inertia, fault);
     if (status) return status;
     lw_bind_added(mb, added_inertia);
-    for (int k = 0; k < mb->nv; ++k) joint_acceleration[k] = 0.0;
-    status = lw_accelerations(mb, state, state + mb->nq, wrench, joint_acceleration, fault);
+    for (int k = 0; k < mb->nv; ++k) e->joint_acceleration[k] = 0.0;
+    status = lw_accelerations(mb, state, state + mb->nq, wrench, e->joint_acceleration, fault);
+    if (!status && mb->rows) status = load_closures(mb, state, wrench, e, fault);
     if (status) return status;
     for (int i = 0; i < mb->n; ++i) {
         const lw_link *l = &mb->link[i];
         lw_spatial at_com = spatial_axpy(1.0, l->bias_force, inertia_times(&l->articulated, l->acceleration));
         lw_spatial at_joint = {at_com.linear, lw_add(at_com.angular, lw_cross(l->arm, at_com.linear))};
-        store6(acceleration + 6 * l->body, l->acceleration);
-        store6(reaction + 6 * l->body, at_joint);
-        store6(total_wrench + 6 * l->body, lw_total_wrench(l, wrench));
+        store6(e->acceleration + 6 * l->body, l->acceleration);
+        store6(e->reaction + 6 * l->body, at_joint);
+        store6(e->total_wrench + 6 * l->body, lw_total_wrench(l, wrench));
     }
     return LW_OK;
 }

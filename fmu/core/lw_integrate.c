@@ -41,7 +41,7 @@ static int overflowed(const double *values, int first, int count) {
     return 0;
 }
 
-/* Every accepted substep ends here: unit quaternions, finite numbers, and what a formulation adds. */
+/* Every accepted substep ends here: unit quaternions, finite numbers, closed loops, what a formulation adds. */
 static int settle(lw_run *run, double *y, double s) {
     lw_multibody *mb = run->mb;
     lw_coordinate_normalise(mb, y);
@@ -52,9 +52,9 @@ static int settle(lw_run *run, double *y, double s) {
         run->step->fault->time = s * run->step->h;
         return LW_NOT_FINITE;
     }
-    if (!mb->formulation) return LW_OK;
     run->step->fault->time = s * run->step->h;
-    return mb->formulation->settle(mb, y, y + mb->nq, run->step->fault);
+    if (mb->formulation) return mb->formulation->settle(mb, y, y + mb->nq, run->step->fault);
+    return mb->rows ? lw_project(mb, y, y + mb->nq, run->step->fault) : LW_OK;
 }
 
 /* ---- explicit Runge-Kutta methods ---- */
@@ -179,7 +179,7 @@ static int accept(lw_run *run, double time) {
     mb->rate[6] = mb->rate[0];
     mb->rate[0] = last;
     int status = settle(run, mb->y, time / run->step->h);
-    if (!status && mb->formulation) return derive(run, time / run->step->h, mb->y, mb->rate[0]);
+    if (!status && (mb->formulation || mb->rows)) return derive(run, time / run->step->h, mb->y, mb->rate[0]);
     lw_coordinate_rate(mb, mb->y, mb->y + mb->nq, mb->rate[0]);
     return status;
 }

@@ -158,5 +158,9 @@ double lw_multibody_joint_gap(const lw_multibody *mb, const lw_unaligned *positi
         double own = gap(l, l->parent < 0 ? -1 : mb->link[l->parent].body, position, orientation);
         if (!(own <= largest)) largest = own; /* not a number stays visible */
     }
+    for (int32_t i = 0; i < mb->closures; ++i) {
+        double own = lw_closure_gap(mb, &mb->closure[i], position, orientation);
+        if (!(own <= largest)) largest = own;
+    }
     return largest;
 }

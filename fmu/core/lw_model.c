@@ -6,17 +6,36 @@
 /* q, v, and two quadratures */
 static size_t vector_length(int32_t nq, int32_t nv) { return (size_t)nq + (size_t)nv + 2; }
 
-size_t lw_multibody_size(int32_t n, int32_t nq, int32_t nv) {
-    size_t doubles = 6 * (size_t)n + 2 * (size_t)nv + (size_t)nq;
-    doubles += (2 + LW_MAX_STAGES) * vector_length(nq, nv);
-    return sizeof(lw_multibody) + (size_t)n * sizeof(lw_link) + doubles * sizeof(double);
+int32_t lw_closure_row_count(const lw_tables *t) {
+    int32_t rows = 0;
+    for (int32_t c = 0; c < t->closures; ++c)
+        for (int bit = 0; bit < 7; ++bit) rows += t->closure_rows[c] >> bit & 1;
+    return rows;
+}
+
+size_t lw_multibody_size(const lw_tables *t) {
+    size_t n = (size_t)t->n, nv = (size_t)t->nv, closures = (size_t)t->closures;
+    size_t rows = (size_t)lw_closure_row_count(t), paths = closures * n + 1; /* + 1: an even number */
+    size_t doubles = 6 * n + 2 * nv + (size_t)t->nq + (2 + LW_MAX_STAGES) * vector_length(t->nq, t->nv);
+    doubles += rows * nv + 2 * rows * rows + 4 * rows;
+    return sizeof(lw_multibody) + n * sizeof(lw_link) + closures * sizeof(lw_closure) + rows * sizeof(lw_row) +
+           doubles * sizeof(double) + paths / 2 * 2 * sizeof(int32_t);
 }
 
 /* Cut the block behind the struct into its arrays. */
 static void lay_out(lw_multibody *mb) {
-    size_t n = (size_t)mb->n, length = vector_length(mb->nq, mb->nv);
+    size_t n = (size_t)mb->n, length = vector_length(mb->nq, mb->nv), rows = (size_t)mb->rows;
     mb->link = (lw_link *)(mb + 1);
-    double *next = (double *)(mb->link + n);
+    mb->closure = (lw_closure *)(mb->link + n);
+    mb->row = (lw_row *)(mb->closure + mb->closures);
+    double *next = (double *)(mb->row + rows);
+    mb->spread = next, next += rows * (size_t)mb->nv;
+    mb->delassus = next, next += rows * rows;
+    mb->factor = next, next += rows * rows;
+    mb->row_scale = next, next += rows;
+    mb->multiplier = next, next += rows;
+    mb->right = next, next += rows;
+    mb->correction = next, next += rows;
     mb->stiffness = next, next += mb->nv;
     mb->damping = next, next += mb->nv;
     mb->rest = next, next += mb->nq;
@@ -24,6 +43,7 @@ static void lay_out(lw_multibody *mb) {
     mb->y = next, next += length;
     mb->trial = next, next += length;
     for (int s = 0; s < LW_MAX_STAGES; ++s, next += length) mb->rate[s] = next;
+    for (int32_t c = 0; c < mb->closures; ++c) mb->closure[c].path = (int32_t *)next + (size_t)c * n;
     /* Coordinates that no joint uses stay as they are: their rates are never written again. */
     memset(mb->rate[0], 0, LW_MAX_STAGES * length * sizeof(double));
 }
@@ -95,6 +115,8 @@ int lw_multibody_init(lw_multibody *mb, const lw_tables *t, lw_fault *fault) {
     mb->nq = t->nq;
     mb->nv = t->nv;
     mb->formulation = NULL;
+    mb->closures = t->closures;
+    mb->rows = lw_closure_row_count(t);
     mb->gravity = lw_load3(t->gravity);
     lay_out(mb);
     memcpy(mb->stiffness, t->stiffness, (size_t)t->nv * sizeof(double));
@@ -105,5 +127,6 @@ int lw_multibody_init(lw_multibody *mb, const lw_tables *t, lw_fault *fault) {
         build_link(&mb->link[k], t, body);
         mb->link[k].parent = t->parent[body] < 0 ? -1 : find(mb->link, k, t->parent[body]);
     }
+    lw_closures_build(mb, t);
     return LW_OK;
 }

@@ -44,6 +44,25 @@ typedef struct {
     lw_column column[6];
 } lw_link;
 
+/* A closure of the tree: joint between two bodies that have their places in it already. */
+typedef struct {
+    int32_t kept, row, rows; /* bits of the table; its first row among all, their number */
+    int32_t link[2];         /* -1 = world */
+    int32_t *path;           /* links that it moves, leaves first: from link[0] and link[1] to where they meet,
+                                and from there to the root */
+    int32_t count[3], links; /* of each of the three ways, and of all */
+    lw_vec3 point[2];
+    lw_mat3 rotation[2];
+    double length;
+} lw_closure;
+
+/* One scalar equation value(q) = 0 of a closure: rate = on . twists, and rate' = on . accelerations + drift. */
+typedef struct {
+    lw_spatial on[2]; /* force and torque at the COMs, for a multiplier of 1 */
+    double value, rate, drift;
+    int32_t envelope; /* first row that a link is shared with */
+} lw_row;
+
 enum { LW_MAX_STAGES = 7 };
 
 /* Another way to the accelerations than articulated bodies: see ../baselines. */
@@ -61,6 +80,12 @@ struct lw_multibody {
     lw_vec3 gravity;
     lw_link *link; /* n, in topological order */
     double *stiffness, *damping, *rest;
+    int32_t closures, rows;
+    lw_closure *closure; /* closures */
+    lw_row *row;         /* rows */
+    double *spread;      /* (rows,nv) generalised force of each row at each column, as eliminated */
+    double *delassus, *factor; /* (rows,rows), lower halves, scaled: acceleration of row i by force of row j */
+    double *row_scale, *multiplier, *right, *correction; /* (rows) */
     double *wrench;                 /* (n,6) at the time of a stage */
     double *y, *trial, *rate[LW_MAX_STAGES]; /* q, v, work, dissipated: state, stage, derivatives */
 };
@@ -69,6 +94,21 @@ struct lw_multibody {
 int lw_tables_check(const lw_tables *tables, lw_fault *fault);
 /* lw_kinematics.c: poses, velocities, motion vectors and bias accelerations of all links. */
 void lw_kinematics(lw_multibody *multibody, const double *q, const double *v);
+/* lw_closures.c: equations of all closures after lw_kinematics; forces of their multipliers, added to wrench
+ * (n,6), on the second bodies at their points as reaction (closures,6). */
+void lw_closures_build(lw_multibody *multibody, const lw_tables *tables);
+void lw_closure_equations(lw_multibody *multibody);
+void lw_closure_forces(const lw_multibody *multibody, double *wrench, double *reaction);
+double lw_closure_gap(const lw_multibody *multibody, const lw_closure *closure, const lw_unaligned *position,
+                      const lw_unaligned *orientation);
+/* lw_delassus.c, after the elimination of lw_dynamics.c: what the rows' forces do to the rows; multipliers for
+ * `right`, the wanted change of each row; the joints' answer to them; accelerations that keep the closures. */
+void lw_delassus_factor(lw_multibody *multibody);
+void lw_delassus_solve(lw_multibody *multibody);
+void lw_delassus_respond(lw_multibody *multibody, double *joint_velocity);
+void lw_delassus_close(lw_multibody *multibody, double *joint_acceleration);
+/* lw_projection.c: q and v moved onto the closures. */
+int lw_project(lw_multibody *multibody, double *q, double *v, lw_fault *fault);
 /* lw_coordinates.c */
 void lw_coordinate_rate(const lw_multibody *multibody, const double *q, const double *v, double *rate);
 void lw_coordinate_normalise(const lw_multibody *multibody, double *q);
@@ -80,6 +120,9 @@ double lw_spring_energy(const lw_multibody *multibody, const double *q);
 double lw_damper_power(const lw_multibody *multibody, const double *v);
 /* lw_dynamics.c: set the added inertia of the coming evaluations; accelerations; power of the wrench. */
 void lw_bind_added(lw_multibody *multibody, const double *added_inertia);
+int lw_tree_accelerations(lw_multibody *multibody, const double *q, const double *v, const double *wrench,
+                          double *joint_acceleration, lw_fault *fault);
+void lw_outward(lw_multibody *multibody, int with_bias, double *joint_acceleration);
 int lw_accelerations(lw_multibody *multibody, const double *q, const double *v, const double *wrench,
                      double *joint_acceleration, lw_fault *fault);
 lw_spatial lw_total_wrench(const lw_link *link, const double *wrench);

@@ -17,10 +17,18 @@ enum { LW_JOINT_TYPES = 6 };
 
 typedef enum { LW_EULER, LW_SEMI_IMPLICIT_EULER, LW_RK4, LW_DOPRI5 } lw_integrator;
 
+/* What a closure keeps: bits of closure_rows. Translations are along the axes of the frame on its first body,
+ * rotations about them; both frames coincide where all is kept. LW_DISTANCE stands alone. */
+enum {
+    LW_KEEP_X = 1, LW_KEEP_Y = 2, LW_KEEP_Z = 4, LW_KEEP_TURN_X = 8, LW_KEEP_TURN_Y = 16, LW_KEEP_TURN_Z = 32,
+    LW_DISTANCE = 64
+};
+
 /* A mechanism. Joint i carries body i; q_index and v_index are explicit, so that a joint may own more
- * coordinates than its type needs. Coordinates that no joint uses keep their value. */
+ * coordinates than its type needs. Coordinates that no joint uses keep their value. Closures are joints
+ * that close loops of the tree. */
 typedef struct {
-    int32_t n, nq, nv;
+    int32_t n, nq, nv, closures;
     const int32_t *parent;         /* (n) index of the parent body, -1 = world */
     const int32_t *order;          /* (n) the bodies, every parent before its children */
     const int32_t *joint_type;     /* (n) lw_joint_type */
@@ -36,6 +44,11 @@ typedef struct {
     const double *stiffness;       /* (nv) [N/m, N m/rad] */
     const double *damping;         /* (nv) [N s/m, N m s/rad] */
     const double *rest;            /* (nq) configuration without spring force */
+    const int32_t *closure_body;    /* (closures,2) -1 = world */
+    const int32_t *closure_rows;    /* (closures) bits LW_KEEP_... or LW_DISTANCE */
+    const double *closure_point;    /* (closures,2,3) on the bodies, body frame, from the COM [m] */
+    const double *closure_rotation; /* (closures,2,3,3) frame to body frame */
+    const double *closure_length;   /* (closures) distance [m] of LW_DISTANCE */
 } lw_tables;
 
 /* 0 is success; `lw_fault` names the item and the time. */
@@ -51,6 +64,7 @@ typedef enum {
     LW_RESPONSE_NOT_FINITE,  /* item: body */
     LW_NOT_CONVERGED,        /* item: body whose affine wrench is not met */
     LW_JOINT_OPEN,           /* item: body whose joint cannot be closed */
+    LW_OPEN,                 /* item: closure that the mechanism cannot close */
     /* arguments */
     LW_BAD_STEP = 20,
     LW_BAD_NODES,
@@ -73,7 +87,12 @@ typedef enum {
     LW_BAD_GRAVITY,
     LW_BAD_STIFFNESS,
     LW_BAD_DAMPING,
-    LW_BAD_REST
+    LW_BAD_REST,
+    LW_BAD_CLOSURE_BODY,
+    LW_BAD_CLOSURE_ROWS,
+    LW_BAD_CLOSURE_POINT,
+    LW_BAD_CLOSURE_ROTATION,
+    LW_BAD_CLOSURE_LENGTH
 } lw_status;
 
 typedef struct {
@@ -87,8 +106,8 @@ typedef struct lw_multibody lw_multibody;
 LW_API int lw_joint_nq(int joint_type);
 LW_API int lw_joint_nv(int joint_type);
 
-/* Bytes that a mechanism of this size needs; 8-byte alignment. */
-LW_API size_t lw_multibody_size(int32_t n, int32_t nq, int32_t nv);
+/* Bytes that a mechanism needs, 8-byte alignment; reads n, nq, nv, closures and closure_rows. */
+LW_API size_t lw_multibody_size(const lw_tables *tables);
 
 /* Check the tables and build the mechanism in `memory`; the tables may go afterwards. */
 LW_API int lw_multibody_init(lw_multibody *memory, const lw_tables *tables, lw_fault *fault);
@@ -141,18 +160,35 @@ LW_API void lw_affine_inertia(lw_multibody *multibody, const double *state, cons
 LW_API void lw_multibody_motion(lw_multibody *multibody, const double *state, lw_unaligned *position,
                                 lw_unaligned *orientation, lw_unaligned *linear, lw_unaligned *angular);
 
-/* Accelerations and reactions under `wrench` (n,6): joint_acceleration (nv), acceleration (n,6) linear
- * first, reaction (n,6) of parent on child at the joint's point on the child, total_wrench (n,6). */
+/* Accelerations and forces under `wrench` (n,6). */
+typedef struct {
+    double *joint_acceleration; /* (nv) */
+    double *acceleration;       /* (n,6) linear first */
+    double *reaction;           /* (n,6) of parent on child at the joint's point on the child */
+    double *total_wrench;       /* (n,6) */
+    double *closure_reaction;   /* (closures,6) of the first on the second body at the point on the second */
+} lw_evaluation;
+
 LW_API int lw_multibody_evaluate(lw_multibody *multibody, const double *state, const double *wrench,
-                                 const double *added_inertia, double *joint_acceleration,
-                                 double *acceleration, double *reaction, double *total_wrench,
+                                 const double *added_inertia, const lw_evaluation *evaluation,
                                  lw_fault *fault);
+
+/* Number of rows of all closures. */
+LW_API int32_t lw_closure_row_count(const lw_tables *tables);
+
+/* The closures at a state: by how much each row is violated, value (rows) [m, rad], and how it changes,
+ * value' = jacobian (rows,nv) v. */
+LW_API void lw_multibody_closures(lw_multibody *multibody, const double *state, double *value,
+                                  double *jacobian);
+
+/* Move a state (in place) to the nearest one, by kinetic energy, that closes all loops. */
+LW_API int lw_multibody_close(lw_multibody *multibody, double *state, lw_fault *fault);
 
 /* Kinetic and potential energy [J]; gravity counts from the origin of W, springs from their rest. */
 LW_API void lw_multibody_energy(lw_multibody *multibody, const double *state, double *kinetic,
                                 double *potential);
 
-/* Largest distance [m] by which given poses violate a joint. */
+/* Largest distance [m] by which given poses violate a joint or closure. */
 LW_API double lw_multibody_joint_gap(const lw_multibody *multibody, const lw_unaligned *position,
                                      const lw_unaligned *orientation);
 

@@ -102,15 +102,34 @@ static int check_coordinate_values(const lw_tables *t, lw_fault *fault) {
     return LW_OK;
 }
 
+/* A distance stands alone and is not zero; anything else keeps at least one direction. */
+static int check_closure(const lw_tables *t, int i) {
+    int32_t kept = t->closure_rows[i];
+    const int32_t *body = t->closure_body + 2 * i;
+    if (body[0] < -1 || body[0] >= t->n || body[1] < -1 || body[1] >= t->n || body[0] == body[1])
+        return LW_BAD_CLOSURE_BODY;
+    if (kept < 1 || kept > LW_DISTANCE) return LW_BAD_CLOSURE_ROWS;
+    if (!all_finite(t->closure_point + 6 * i, 6)) return LW_BAD_CLOSURE_POINT;
+    for (int side = 0; side < 2; ++side)
+        if (!is_rotation(t->closure_rotation + 18 * i + 9 * side)) return LW_BAD_CLOSURE_ROTATION;
+    if (kept == LW_DISTANCE && !(t->closure_length[i] > 0.0 && isfinite(t->closure_length[i])))
+        return LW_BAD_CLOSURE_LENGTH;
+    return LW_OK;
+}
+
 int lw_tables_check(const lw_tables *t, lw_fault *fault) {
     fault->item = 0;
     fault->time = 0.0;
-    if (t->n < 1 || t->nq < 0 || t->nv < 0) return LW_BAD_COUNT;
+    if (t->n < 1 || t->nq < 0 || t->nv < 0 || t->closures < 0) return LW_BAD_COUNT;
     if (!all_finite(t->gravity, 3)) return LW_BAD_GRAVITY;
     int status = check_coordinate_values(t, fault);
     for (int i = 0; i < t->n && !status; ++i) {
         status = check_row(t, i);
         fault->item = status == LW_BAD_REST ? t->q_index[i] : i;
+    }
+    for (int i = 0; i < t->closures && !status; ++i) {
+        status = check_closure(t, i);
+        fault->item = i;
     }
     return status;
 }

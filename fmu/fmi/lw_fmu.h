@@ -12,7 +12,7 @@
 
 #include <stdint.h>
 
-/* X(name, number of values), with n bodies, nq coordinates, nv degrees of freedom. Frames and units are
+/* X(name, number of values), with n bodies, nq coordinates and nv degrees of freedom. Frames and units are
  * those of lw_multibody.h; reactions act from parent on child at the joint's point on the child. */
 #define LW_DYNAMICS_KNOWN(X)                                                                             \
     X(MASS, n) X(INERTIA, 6 * n) X(PARENT_POINT, 3 * n) X(CHILD_POINT, 3 * n) X(GRAVITY, 3)              \
@@ -23,7 +23,9 @@
     X(DER_Q, nq) X(DER_V, nv)                                                                            \
     X(POSITION, 3 * n) X(ORIENTATION, 4 * n) X(LINEAR, 3 * n) X(ANGULAR, 3 * n)                          \
     X(LINEAR_ACCELERATION, 3 * n) X(ANGULAR_ACCELERATION, 3 * n)                                         \
-    X(REACTION_FORCE, 3 * n) X(REACTION_TORQUE, 3 * n) X(KINETIC_ENERGY, 1) X(POTENTIAL_ENERGY, 1)
+    X(REACTION_FORCE, 3 * n) X(REACTION_TORQUE, 3 * n)                                                   \
+    X(CLOSURE_FORCE, 3 * lw_fmu_closures) X(CLOSURE_TORQUE, 3 * lw_fmu_closures)                         \
+    X(KINETIC_ENERGY, 1) X(POTENTIAL_ENERGY, 1)
 
 /* A field leaves density, wind, length and span unused (no variable refers to them). */
 #define LW_AERO_KNOWN(X)                                                                                 \
@@ -69,6 +71,8 @@ extern const int32_t lw_fmu_n, lw_fmu_nq, lw_fmu_nv; /* in aero nq = nv = 0 */
 /* ---- dynamics: what of lw_tables is no parameter ---- */
 extern const int32_t lw_fmu_parent[], lw_fmu_order[], lw_fmu_joint_type[], lw_fmu_q_index[], lw_fmu_v_index[];
 extern const double lw_fmu_parent_rotation[], lw_fmu_child_rotation[];
+extern const int32_t lw_fmu_closures, lw_fmu_closure_body[], lw_fmu_closure_rows[];
+extern const double lw_fmu_closure_point[], lw_fmu_closure_rotation[], lw_fmu_closure_length[];
 
 /* ---- aero ---- */
 enum { LW_AERO_PLATE, LW_AERO_FIELD };

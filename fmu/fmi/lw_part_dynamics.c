@@ -12,7 +12,8 @@ enum { RATE = 1, MOTION = 2, ACCELERATION = 4, ENERGY = 8 }; /* groups */
 struct lw_part {
     uint32_t first[LW_DYNAMICS_SECTIONS + 1];
     lw_multibody *multibody;
-    double *state, *wrench, *joint, *acceleration, *reaction, *total;
+    double *state, *wrench;
+    lw_evaluation out;
     const double *added; /* added inertia, NULL where it is zero */
 };
 
@@ -42,10 +43,24 @@ static size_t forces(void) { return 6 * (size_t)lw_fmu_n; }
 
 size_t lw_part_memory(void) { return RATES + MAX_ORDER * forces(); }
 
+/* What of the mechanism is constant. */
+static lw_tables constants(void) {
+    lw_tables tables = {
+        .n = lw_fmu_n, .nq = lw_fmu_nq, .nv = lw_fmu_nv, .closures = lw_fmu_closures,
+        .parent = lw_fmu_parent, .order = lw_fmu_order, .joint_type = lw_fmu_joint_type,
+        .q_index = lw_fmu_q_index, .v_index = lw_fmu_v_index,
+        .parent_rotation = lw_fmu_parent_rotation, .child_rotation = lw_fmu_child_rotation,
+        .closure_body = lw_fmu_closure_body, .closure_rows = lw_fmu_closure_rows,
+        .closure_point = lw_fmu_closure_point, .closure_rotation = lw_fmu_closure_rotation,
+        .closure_length = lw_fmu_closure_length};
+    return tables;
+}
+
 size_t lw_part_size(void) {
-    size_t state = lw_state_size() + 1, doubles = state + (MAX_ORDER + 1 + 3) * forces() + (size_t)lw_fmu_nv;
-    return (sizeof(lw_part) + 7) / 8 * 8 + doubles * sizeof(double) +
-           (lw_multibody_size(lw_fmu_n, lw_fmu_nq, lw_fmu_nv) + 7) / 8 * 8;
+    lw_tables tables = constants();
+    size_t doubles = lw_state_size() + 1 + (MAX_ORDER + 1 + 3) * forces() + (size_t)lw_fmu_nv;
+    doubles += 6 * (size_t)lw_fmu_closures;
+    return (sizeof(lw_part) + 7) / 8 * 8 + doubles * sizeof(double) + (lw_multibody_size(&tables) + 7) / 8 * 8;
 }
 
 void lw_part_create(lw_instance *instance) {
@@ -58,10 +73,11 @@ void lw_part_create(lw_instance *instance) {
     double *next = (double *)(void *)((char *)part + (sizeof *part + 7) / 8 * 8);
     part->state = next, next += lw_state_size() + 1;
     part->wrench = next, next += (MAX_ORDER + 1) * forces();
-    part->acceleration = next, next += forces();
-    part->reaction = next, next += forces();
-    part->total = next, next += forces();
-    part->joint = next, next += lw_fmu_nv;
+    part->out.acceleration = next, next += forces();
+    part->out.reaction = next, next += forces();
+    part->out.total_wrench = next, next += forces();
+    part->out.joint_acceleration = next, next += lw_fmu_nv;
+    part->out.closure_reaction = next, next += 6 * lw_fmu_closures;
     part->multibody = (lw_multibody *)(void *)next;
 }
 
@@ -120,14 +136,10 @@ static int check_solver(const lw_instance *instance) {
 int lw_part_configure(lw_instance *instance) {
     lw_fault fault;
     int status = check_solver(instance);
-    lw_tables tables = {
-        .n = lw_fmu_n, .nq = lw_fmu_nq, .nv = lw_fmu_nv,
-        .parent = lw_fmu_parent, .order = lw_fmu_order, .joint_type = lw_fmu_joint_type,
-        .q_index = lw_fmu_q_index, .v_index = lw_fmu_v_index,
-        .parent_point = AT(PARENT_POINT), .parent_rotation = lw_fmu_parent_rotation,
-        .child_point = AT(CHILD_POINT), .child_rotation = lw_fmu_child_rotation,
-        .mass = AT(MASS), .inertia = AT(INERTIA), .gravity = AT(GRAVITY),
-        .stiffness = AT(STIFFNESS), .damping = AT(DAMPING), .rest = AT(REST)};
+    lw_tables tables = constants();
+    tables.parent_point = AT(PARENT_POINT), tables.child_point = AT(CHILD_POINT);
+    tables.mass = AT(MASS), tables.inertia = AT(INERTIA), tables.gravity = AT(GRAVITY);
+    tables.stiffness = AT(STIFFNESS), tables.damping = AT(DAMPING), tables.rest = AT(REST);
     if (status) return status;
     status = lw_multibody_init(instance->part->multibody, &tables, &fault);
     return status ? refuse_table(instance, status, &fault) : LW_FMI_OK;
@@ -138,8 +150,9 @@ int lw_part_configure(lw_instance *instance) {
 static int discard(const lw_instance *instance, int status, const lw_fault *fault) {
     const char *expected = "numbers that stay finite", *was = "an overflow";
     if (status == LW_SINGULAR) expected = "a joint with inertia to move", was = "a massless body";
+    if (status == LW_OPEN) expected = "loops that stay closed", was = "one that does not reach";
     if (status == LW_STEP_UNDERFLOW) expected = "a substep that meets the tolerance", was = "none";
-    return lw_report(instance, LW_FMI_DISCARD, "Expected %s but was %s at body %d, %.9g s into the step.",
+    return lw_report(instance, LW_FMI_DISCARD, "Expected %s but was %s at body or loop %d, %.9g s into the step.",
                      expected, was, fault->item, fault->time);
 }
 
@@ -208,8 +221,8 @@ static void load_state(lw_instance *instance) {
     part->state[lw_state_size()] = instance->store[PROPOSED];
 }
 
-static void split(const double *six, double *linear, double *angular) {
-    for (int i = 0; i < lw_fmu_n; ++i) {
+static void split(int32_t count, const double *six, double *linear, double *angular) {
+    for (int i = 0; i < count; ++i) {
         memcpy(linear + 3 * i, six + 6 * i, 3 * sizeof(double));
         memcpy(angular + 3 * i, six + 6 * i + 3, 3 * sizeof(double));
     }
@@ -220,11 +233,12 @@ static int update_acceleration(lw_instance *instance) {
     lw_fault fault;
     pack_wrench(instance, 0.0, part->wrench);
     int status = lw_multibody_evaluate(part->multibody, part->state, part->wrench, find_added(instance),
-                                       part->joint, part->acceleration, part->reaction, part->total, &fault);
+                                       &part->out, &fault);
     if (status) return discard(instance, status, &fault);
-    memcpy(AT(DER_V), part->joint, (size_t)lw_fmu_nv * sizeof(double));
-    split(part->acceleration, AT(LINEAR_ACCELERATION), AT(ANGULAR_ACCELERATION));
-    split(part->reaction, AT(REACTION_FORCE), AT(REACTION_TORQUE));
+    memcpy(AT(DER_V), part->out.joint_acceleration, (size_t)lw_fmu_nv * sizeof(double));
+    split(lw_fmu_n, part->out.acceleration, AT(LINEAR_ACCELERATION), AT(ANGULAR_ACCELERATION));
+    split(lw_fmu_n, part->out.reaction, AT(REACTION_FORCE), AT(REACTION_TORQUE));
+    split(lw_fmu_closures, part->out.closure_reaction, AT(CLOSURE_FORCE), AT(CLOSURE_TORQUE));
     return LW_FMI_OK;
 }
 

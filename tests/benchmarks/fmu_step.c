@@ -26,12 +26,19 @@ static const double *start(unsigned section) {
 
 static lw_multibody *build(void) {
     lw_fault fault;
-    lw_multibody *memory = malloc(lw_multibody_size(lw_fmu_n, lw_fmu_nq, lw_fmu_nv));
     lw_tables tables = {
-        lw_fmu_n, lw_fmu_nq, lw_fmu_nv, lw_fmu_parent, lw_fmu_order, lw_fmu_joint_type, lw_fmu_q_index,
-        lw_fmu_v_index, start(LW_DYNAMICS_PARENT_POINT), lw_fmu_parent_rotation, start(LW_DYNAMICS_CHILD_POINT),
-        lw_fmu_child_rotation, start(LW_DYNAMICS_MASS), start(LW_DYNAMICS_INERTIA), start(LW_DYNAMICS_GRAVITY),
-        start(LW_DYNAMICS_STIFFNESS), start(LW_DYNAMICS_DAMPING), start(LW_DYNAMICS_REST)};
+        .n = lw_fmu_n, .nq = lw_fmu_nq, .nv = lw_fmu_nv, .closures = lw_fmu_closures,
+        .parent = lw_fmu_parent, .order = lw_fmu_order, .joint_type = lw_fmu_joint_type,
+        .q_index = lw_fmu_q_index, .v_index = lw_fmu_v_index,
+        .parent_point = start(LW_DYNAMICS_PARENT_POINT), .parent_rotation = lw_fmu_parent_rotation,
+        .child_point = start(LW_DYNAMICS_CHILD_POINT), .child_rotation = lw_fmu_child_rotation,
+        .mass = start(LW_DYNAMICS_MASS), .inertia = start(LW_DYNAMICS_INERTIA),
+        .gravity = start(LW_DYNAMICS_GRAVITY), .stiffness = start(LW_DYNAMICS_STIFFNESS),
+        .damping = start(LW_DYNAMICS_DAMPING), .rest = start(LW_DYNAMICS_REST),
+        .closure_body = lw_fmu_closure_body, .closure_rows = lw_fmu_closure_rows,
+        .closure_point = lw_fmu_closure_point, .closure_rotation = lw_fmu_closure_rotation,
+        .closure_length = lw_fmu_closure_length};
+    lw_multibody *memory = malloc(lw_multibody_size(&tables));
     if (lw_multibody_init(memory, &tables, &fault)) abort();
     return memory;
 }

@@ -101,7 +101,7 @@ def _model(part, sections, start, calculated, integers, constants, scalar, token
 
 def dynamics(tables: Tables, q0, v0, *, integrator=2, substeps=1, scalar=False, token=TOKEN) -> Model:
     """Return the FMU of a mechanism."""
-    n, nq, nv = len(tables.parent), len(q0), len(v0)
+    n, nq, nv, closures = len(tables.parent), len(q0), len(v0), len(tables.closure_rows)
     sections = {
         "MASS": n,
         "INERTIA": 6 * n,
@@ -128,15 +128,20 @@ def dynamics(tables: Tables, q0, v0, *, integrator=2, substeps=1, scalar=False, 
         "ANGULAR_ACCELERATION": 3 * n,
         "REACTION_FORCE": 3 * n,
         "REACTION_TORQUE": 3 * n,
+        "CLOSURE_FORCE": 3 * closures,
+        "CLOSURE_TORQUE": 3 * closures,
         "KINETIC_ENERGY": 1,
         "POTENTIAL_ENERGY": 1,
     }
     start = {name: getattr(tables, name.lower()) for name in sections if hasattr(tables, name.lower())}
     start |= {"RTOL": 1e-6, "ATOL": 1e-9, "Q": q0, "V": v0}
     constants = f"const int32_t lw_fmu_n = {n}, lw_fmu_nq = {nq}, lw_fmu_nv = {nv};\n"
-    for name in ("parent", "order", "joint_type", "q_index", "v_index"):
+    constants += f"const int32_t lw_fmu_closures = {closures};\n"
+    for name in ("parent", "order", "joint_type", "q_index", "v_index", "closure_body", "closure_rows"):
         constants += _array("int32_t", name, getattr(tables, name))
-    for name in ("parent_rotation", "child_rotation"):
+    for name in (
+        "parent_rotation", "child_rotation", "closure_point", "closure_rotation", "closure_length",
+    ):  # fmt: skip
         constants += _array("double", name, getattr(tables, name))
     integers = {"INTEGRATOR": integrator, "SUBSTEPS": substeps}
     return _model("dynamics", sections, start, set(sections) - KNOWN, integers, constants, scalar, token)

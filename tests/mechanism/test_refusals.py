@@ -59,10 +59,11 @@ WRONG = [
      f"{LEAVE}"),
     # out of the plane
     (pair("spherical"),
-     f"joints[0].type: expected fixed, revolute, prismatic or planar, {NUMBER}; "
+     f"joints[0].type: expected fixed, revolute, prismatic, planar or distance, {NUMBER}; "
      f'got "spherical". Give {SIX}'),
     (pair("free"),
-     f"joints[0].type: expected fixed, revolute, prismatic or planar, {NUMBER}; got \"free\". Give {SIX}"),
+     f"joints[0].type: expected fixed, revolute, prismatic, planar or distance, {NUMBER}; "
+     f'got "free". Give {SIX}'),
     (pair("revolute", axis=[0, 1, 1]),
      f"joints[0].axis: expected an axis along z, {NUMBER}; got [0, 1, 1]. Leave it out, or give {SIX}"),
     (pair("prismatic"),

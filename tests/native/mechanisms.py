@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -36,6 +37,38 @@ class Body:
     rest: np.ndarray | None = None
 
 
+KEPT = {  # bits: translations 1, 2, 4, turns 8, 16, 32, distance 64
+    "spherical": 7, "revolute": 31, "prismatic": 59, "planar": 28, "fixed": 63, "distance": 64
+}  # fmt: skip
+
+
+@dataclass
+class Closure:
+    """A joint between two bodies of the tree; ``kept`` are the bits of the core's table."""
+
+    first: int
+    second: int
+    kept: int
+    first_point: tuple[float, ...] = (0.0, 0.0, 0.0)
+    second_point: tuple[float, ...] = (0.0, 0.0, 0.0)
+    first_rotation: np.ndarray = field(default_factory=lambda: IDENTITY)
+    second_rotation: np.ndarray = field(default_factory=lambda: IDENTITY)
+    length: float = 1.0
+
+
+def closed(closures: list[Closure]) -> dict[str, np.ndarray]:
+    """Return the tables of closures, for ``Tables``."""
+    return {
+        "closure_body": np.array([(c.first, c.second) for c in closures], np.int32).reshape(-1, 2),
+        "closure_rows": np.array([c.kept for c in closures], np.int32),
+        "closure_point": np.reshape([(c.first_point, c.second_point) for c in closures], (-1, 2, 3)),
+        "closure_rotation": np.reshape(
+            [(c.first_rotation, c.second_rotation) for c in closures], (-1, 2, 3, 3)
+        ),
+        "closure_length": np.array([c.length for c in closures], float),
+    }
+
+
 def rest_of(body: Body) -> np.ndarray:
     if body.rest is not None:
         return np.asarray(body.rest, float)
@@ -52,7 +85,7 @@ def topological(bodies: list[Body]) -> list[int]:
     return order
 
 
-def tables(bodies: list[Body], gravity=(0.0, -9.81, 0.0)) -> Tables:
+def tables(bodies: list[Body], gravity=(0.0, -9.81, 0.0), closures: Sequence[Closure] = ()) -> Tables:
     nq, nv = [NQ[b.joint] for b in bodies], [NV[b.joint] for b in bodies]
 
     def degrees(name):
@@ -75,6 +108,7 @@ def tables(bodies: list[Body], gravity=(0.0, -9.81, 0.0)) -> Tables:
         stiffness=degrees("stiffness"),
         damping=degrees("damping"),
         rest=np.concatenate([rest_of(b) for b in bodies]),
+        **closed(list(closures)),
     )
 
 

@@ -133,6 +133,7 @@ def planar(steps=1200, **changes) -> Run:
         external_work=states[:, 8],
         dissipated_work=np.zeros(k),
         joint_gap=np.abs(random.normal(0, 2e-16, k)),
+        closure_reaction=np.zeros((k, 0, 6)),
     )
     errors = 10.0 ** random.normal([0, -1, -2, -2.5], 0.4, (k, 4))
     return run_of(scenario(**changes), path, errors)
@@ -220,5 +221,6 @@ def flapper(steps=800) -> Run:
         external_work=t.copy(),
         dissipated_work=np.zeros(k),
         joint_gap=np.full(k, 1e-16),
+        closure_reaction=np.zeros((k, 0, 6)),
     )
     return run_of(description, path, np.full((k, 4), np.nan))

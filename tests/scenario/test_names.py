@@ -6,6 +6,7 @@ from typing import get_args
 from linkwind import bus
 from linkwind.aero import FROM_FILE, MODELS
 from linkwind.coupling import SCHEMES
+from linkwind.mechanism.loops import KEPT
 from linkwind.native.forces import COMPONENTS, Coefficients
 from linkwind.native.multibody import JOINT_TYPES, Integrator
 from linkwind.scenario.bodies import JointType
@@ -14,7 +15,8 @@ from linkwind.scenario.settings import IntegratorName, Scheme, Transport
 
 
 def test_joint_types():
-    assert get_args(JointType) == tuple(JOINT_TYPES)
+    assert get_args(JointType) == (*JOINT_TYPES, "distance")
+    assert {*KEPT, "free"} == {*get_args(JointType)}
 
 
 def test_integrators():

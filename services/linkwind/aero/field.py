@@ -11,6 +11,7 @@ from linkwind.aero.expression import Program, compile_program
 from linkwind.errors import ProtocolError, SimulationError
 from linkwind.native.forces import COMPONENTS, Field, FieldTable
 from linkwind.scenario import FieldExpressions, Provider, Scenario
+from linkwind.scenario.topology import carries
 from linkwind.spatial import Array, Motion, Wrench
 
 
@@ -54,7 +55,9 @@ def initial_angles(scenario: Scenario, provider: Provider) -> Array:
     A body without an angle of its own starts near its parent's; one given by a quaternion near zero.
     """
     bodies = {body.name: body for body in scenario.bodies}
-    parents = {joint.child: joint.parent for joint in scenario.joints}
+    carrying = carries((joint.type, joint.parent, joint.child) for joint in scenario.joints)
+    joints = zip(scenario.joints, carrying, strict=True)
+    parents = {joint.child: joint.parent for joint, free in joints if free}
 
     def angle(name: str) -> float:
         body = bodies.get(name)  # none for the world

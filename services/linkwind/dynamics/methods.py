@@ -22,6 +22,11 @@ def multibody(mechanism: Mechanism, scenario: Scenario) -> Multibody:
         MechanismError: the method cannot do this mechanism.
     """
     dynamics = scenario.dynamics
+    if mechanism.closures and dynamics.method != "reduced":
+        raise MechanismError(
+            f"{scenario.source}: dynamics.method: expected reduced, because {mechanism.closures[0]} closes a "
+            f"loop; got {dynamics.method}. Use reduced."
+        )
     try:
         if dynamics.method == "cfe":
             stabilisation = Stabilisation[dynamics.stabilisation.upper()]
@@ -31,4 +36,4 @@ def multibody(mechanism: Mechanism, scenario: Scenario) -> Multibody:
             return Incremental(mechanism.tables, mechanism.bodies)
     except MechanismError as error:
         raise MechanismError(f"{scenario.source}: dynamics.method: {error}") from error
-    return Multibody(mechanism.tables, mechanism.bodies)
+    return Multibody(mechanism.tables, mechanism.bodies, mechanism.closures)

@@ -51,7 +51,7 @@ class Recorder:
         self.log = log
         self.multibody = multibody
         self._step_ns = scenario.coupling.step_ns
-        self._state = StateEncoder(n, len(mechanism.q0), len(mechanism.v0))
+        self._state = StateEncoder(n, len(mechanism.q0), len(mechanism.v0), len(mechanism.closures))
         self._step = StepEncoder(scenario.coupling.order)
         self._accepted, self._accepted_twist = _motion_and_twist(n)
         self._trial, self._trial_twist = _motion_and_twist(n)
@@ -84,6 +84,7 @@ class Recorder:
             external_work=point.state.external_work,
             dissipated_work=point.state.dissipated_work,
             joint_gap=gap,
+            closure_reaction=result.closure_reaction,
         )
         self.log.state(payload, time_ns)
         self._coupling(point, time_ns)

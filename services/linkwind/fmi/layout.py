@@ -5,8 +5,15 @@ from __future__ import annotations
 from itertools import accumulate
 
 
-def dynamics_sections(n: int, nq: int, nv: int) -> dict[str, int]:
-    """Return the size of each section, in order, for n bodies, nq coordinates and nv degrees of freedom."""
+def dynamics_sections(n: int, nq: int, nv: int, closures: int) -> dict[str, int]:
+    """Return the size of each section, in order.
+
+    Args:
+        n: number of bodies.
+        nq: number of coordinates.
+        nv: number of degrees of freedom of the tree.
+        closures: number of joints that close loops.
+    """
     known = {
         "MASS": n, "INERTIA": 6 * n, "PARENT_POINT": 3 * n, "CHILD_POINT": 3 * n, "GRAVITY": 3,
         "STIFFNESS": nv, "DAMPING": nv, "REST": nq, "RTOL": 1, "ATOL": 1,
@@ -15,7 +22,8 @@ def dynamics_sections(n: int, nq: int, nv: int) -> dict[str, int]:
     calculated = {
         "DER_Q": nq, "DER_V": nv, "POSITION": 3 * n, "ORIENTATION": 4 * n, "LINEAR": 3 * n, "ANGULAR": 3 * n,
         "LINEAR_ACCELERATION": 3 * n, "ANGULAR_ACCELERATION": 3 * n, "REACTION_FORCE": 3 * n,
-        "REACTION_TORQUE": 3 * n, "KINETIC_ENERGY": 1, "POTENTIAL_ENERGY": 1,
+        "REACTION_TORQUE": 3 * n, "CLOSURE_FORCE": 3 * closures, "CLOSURE_TORQUE": 3 * closures,
+        "KINETIC_ENERGY": 1, "POTENTIAL_ENERGY": 1,
     }  # fmt: skip
     return known | calculated
 

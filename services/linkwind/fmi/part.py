@@ -118,12 +118,16 @@ def dynamics_part(scenario: Scenario, *, native_arrays: bool) -> Part:
     return Part(
         "dynamics", scenario, mechanism, None,
         variables if native_arrays else scalars(variables),
-        dynamics_sections(n, nq, nv),
+        dynamics_sections(n, nq, nv, len(mechanism.closures)),
         (integers[0], integers[1]),
         {
             "n": n, "nq": nq, "nv": nv, "parent": tables.parent, "order": tables.order,
             "joint_type": tables.joint_type, "q_index": tables.q_index, "v_index": tables.v_index,
             "parent_rotation": tables.parent_rotation, "child_rotation": tables.child_rotation,
+            "closures": len(mechanism.closures),
+            "closure_body": tables.closure_body, "closure_rows": tables.closure_rows,
+            "closure_point": tables.closure_point, "closure_rotation": tables.closure_rotation,
+            "closure_length": tables.closure_length,
         },
     )  # fmt: skip
 

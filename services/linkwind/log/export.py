@@ -22,13 +22,14 @@ XYZ = ("x", "y", "z")
 SIX = ("x", "y", "z", "rx", "ry", "rz")  # linear part, angular part
 COMPONENTS = {
     "position": XYZ, "orientation": ("w", "x", "y", "z"), "linear": XYZ, "angular": XYZ, "acceleration": SIX,
-    "reaction": SIX, "wrench": SIX, "force": XYZ, "torque": XYZ,
+    "reaction": SIX, "closure_reaction": SIX, "wrench": SIX, "force": XYZ, "torque": XYZ,
     "added_inertia": tuple(f"{row}{column}" for row in range(6) for column in range(6)),
 }  # fmt: skip
 UNITS: dict[str, Sequence[str]] = {
     "position": ["m"] * 3, "linear": ["m/s"] * 3, "angular": ["rad/s"] * 3, "force": ["N"] * 3,
     "torque": ["N m"] * 3, "acceleration": ["m/s^2"] * 3 + ["rad/s^2"] * 3,
-    "reaction": ["N"] * 3 + ["N m"] * 3, "wrench": ["N"] * 3 + ["N m"] * 3,
+    "reaction": ["N"] * 3 + ["N m"] * 3, "closure_reaction": ["N"] * 3 + ["N m"] * 3,
+    "wrench": ["N"] * 3 + ["N m"] * 3,
     "kinetic_energy": ["J"], "potential_energy": ["J"], "external_work": ["J"], "dissipated_work": ["J"],
     "joint_gap": ["m"], "residual": ["J^0.5"], "interface_energy": ["J"],
 }  # fmt: skip

@@ -26,9 +26,10 @@ class StateEncoder:
         n: number of bodies.
         nq: number of joint coordinates.
         nv: number of joint velocities.
+        closures: number of joints that close loops.
     """
 
-    def __init__(self, n: int, nq: int, nv: int) -> None:
+    def __init__(self, n: int, nq: int, nv: int, closures: int = 0) -> None:
         six = [0.0] * (6 * n)
         motion = {"position": six[: 3 * n], "orientation": six[: 4 * n]}
         motion |= {"linear": six[: 3 * n], "angular": six[: 3 * n]}
@@ -36,7 +37,8 @@ class StateEncoder:
         self._layout = FixedLayout(
             MESSAGES["State"](
                 step=0, time_ns=0, motion=motion, q=[0.0] * nq, v=[0.0] * nv,
-                acceleration=six, reaction=six, wrench=six, **dict.fromkeys(scalars, 0.0),
+                acceleration=six, reaction=six, wrench=six, closure_reaction=[0.0] * (6 * closures),
+                **dict.fromkeys(scalars, 0.0),
             )
         )  # fmt: skip
         views = self._layout.views
@@ -49,6 +51,7 @@ class StateEncoder:
         self._acceleration = views["acceleration"].reshape(n, 6)
         self._reaction = views["reaction"].reshape(n, 6)
         self._wrench = views["wrench"].reshape(n, 6)
+        self._closure_reaction = views["closure_reaction"].reshape(closures, 6)
         self._energies = self._layout.regions["kinetic_energy"].offset
 
     def encode(
@@ -67,6 +70,7 @@ class StateEncoder:
         external_work: float,
         dissipated_work: float,
         joint_gap: float,
+        closure_reaction: Array | None = None,
     ) -> bytes:
         """Return the State at one communication point.
 
@@ -85,6 +89,7 @@ class StateEncoder:
             external_work: done by the fluid since t_0 [J].
             dissipated_work: taken by joint dampers since t_0 [J].
             joint_gap: largest distance of two joint points, from the poses [m].
+            closure_reaction: of the joints that close loops, as ``reaction``, shape (closures, 6).
         """
         self._step[0] = step
         self._time_ns[0] = time_ns
@@ -96,6 +101,8 @@ class StateEncoder:
         self._acceleration[...] = acceleration
         self._reaction[...] = reaction
         self._wrench[...] = wrench
+        if closure_reaction is not None:
+            self._closure_reaction[...] = closure_reaction
         ENERGIES.pack_into(
             self._layout.buffer, self._energies, kinetic_energy,
             0x51, potential_energy, 0x59, external_work, 0x61, dissipated_work, 0x69, joint_gap,

@@ -42,6 +42,8 @@ class Trajectory(NamedTuple):
         external_work: done by the fluid since t_0 [J], shape (k,).
         dissipated_work: taken by joint dampers since t_0 [J], shape (k,).
         joint_gap: largest distance of two joint points, from the poses [m], shape (k,).
+        closure_reaction: of each of c joints that close loops, parent on child [N, N·m], shape (k, c, 6),
+            force first, in W at the joint's point on the child.
     """
 
     step: Index
@@ -60,6 +62,7 @@ class Trajectory(NamedTuple):
     external_work: Array
     dissipated_work: Array
     joint_gap: Array
+    closure_reaction: Array
 
 
 class Steps(NamedTuple):
@@ -152,7 +155,12 @@ def trajectory(state: dict[str, NDArray[Any]]) -> Trajectory:
         bodies("reaction", 6),
         bodies("wrench", 6),
         *(state[field][:, 0] for field in scalars),
+        *[_sixes(state["closure_reaction"])],
     )
+
+
+def _sixes(values: Array) -> Array:
+    return values.reshape(len(values), values.shape[1] // 6, 6)
 
 
 def steps(step: dict[str, NDArray[Any]]) -> Steps:

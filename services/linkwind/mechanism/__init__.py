@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from linkwind.mechanism.assembly import assemble
 from linkwind.mechanism.start import WORLD_START, JointStart, Start, start
 from linkwind.mechanism.tables import tables
 from linkwind.mechanism.tree import WORLD, carriers, order
@@ -29,6 +30,7 @@ class Mechanism:
         bodies: names, in scenario order.
         joints: name of the joint that carries each body; an automatic root is ``world-`` and the body's
             name.
+        closures: names of the joints that close loops.
         tables: bodies, joints and gravity as flat arrays.
         q0: joint coordinates at the start [m, rad, unit quaternions], shape (nq,).
         v0: joint velocities at the start [m/s, rad/s], shape (nv,).
@@ -37,6 +39,7 @@ class Mechanism:
 
     bodies: tuple[str, ...]
     joints: tuple[str, ...]
+    closures: tuple[str, ...]
     tables: Tables
     q0: Array
     v0: Array
@@ -49,22 +52,32 @@ def build(scenario: Scenario) -> Mechanism:
     A body without a joint gets one to the world at its centre of mass: ``planar`` if every inertia is a
     single number, so that its coordinates are x, y and the angle, else ``free``.
 
+    Loops are closed: bodies whose place or motion is not stated take those that close them.
+
     Raises:
         MechanismError: joints that leave the plane of a planar mechanism, springs that do not fit their
-            joint, or a body that starts in a way that its joint does not allow.
+            joint, a body that starts in a way that its joint does not allow, a loop that does not close, or a
+            start from which it is not settled how the mechanism moves.
     """
-    carried = carriers(scenario)
+    carried, loops = carriers(scenario)
     bodies: dict[int, Start] = {WORLD: WORLD_START}
     joints: dict[int, JointStart] = {}
     for i in order([carrier.parent for carrier in carried]):
         item = f"{scenario.source}: bodies[{i}]"
         bodies[i], joints[i] = start(scenario.bodies[i], carried[i], bodies[carried[i].parent], item)
-    starts = [joints[i] for i in range(len(carried))]
+    count = range(len(carried))
+    starts = [joints[i] for i in count]
+    flat = tables(scenario, carried, starts, loops, [bodies[i] for i in count])
+    q0 = np.concatenate([joint.q for joint in starts])
+    v0 = np.concatenate([joint.v for joint in starts])
+    if loops:
+        q0, v0 = assemble(scenario, flat, loops, q0, v0)
     return Mechanism(
         bodies=tuple(body.name for body in scenario.bodies),
         joints=tuple(carrier.name for carrier in carried),
-        tables=tables(scenario, carried, starts),
-        q0=np.concatenate([joint.q for joint in starts]),
-        v0=np.concatenate([joint.v for joint in starts]),
+        closures=tuple(loop.joint.name for loop in loops),
+        tables=flat,
+        q0=q0,
+        v0=v0,
         has_joints=bool(scenario.joints),
     )

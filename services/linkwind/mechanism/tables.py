@@ -7,19 +7,31 @@ import math
 import numpy as np
 
 from linkwind.errors import MechanismError
+from linkwind.mechanism.loops import closure_tables
 from linkwind.mechanism.quaternion import matrix
-from linkwind.mechanism.start import JointStart
-from linkwind.mechanism.tree import Carrier, order
+from linkwind.mechanism.start import JointStart, Start
+from linkwind.mechanism.tree import Carrier, Loop, order
 from linkwind.native.multibody import JOINT_TYPES, NQ, NV, Tables
 from linkwind.scenario import Body, Scenario
 from linkwind.spatial import Array
 
 
-def tables(scenario: Scenario, carriers: list[Carrier], joints: list[JointStart]) -> Tables:
+def tables(
+    scenario: Scenario, carriers: list[Carrier], joints: list[JointStart], loops: list[Loop],
+    starts: list[Start],
+) -> Tables:  # fmt: skip
     """Return the tables of a mechanism, bodies in scenario order.
 
+    Args:
+        scenario: what is to be laid out.
+        carriers: joint of each body.
+        joints: the same joints at the start.
+        loops: joints that close loops.
+        starts: bodies at the start.
+
     Raises:
-        MechanismError: springs or dampers do not fit the joint's degrees of freedom.
+        MechanismError: springs or dampers do not fit the joint's degrees of freedom, or a joint cannot close
+            a loop.
     """
     types = [carrier.type for carrier in carriers]
     parents = [carrier.parent for carrier in carriers]
@@ -39,6 +51,7 @@ def tables(scenario: Scenario, carriers: list[Carrier], joints: list[JointStart]
         stiffness=np.concatenate([_per_freedom(carrier, "stiffness") for carrier in carriers]),
         damping=np.concatenate([_per_freedom(carrier, "damping") for carrier in carriers]),
         rest=np.concatenate([_rest(carrier) for carrier in carriers]),
+        **closure_tables(loops, starts, planar=scenario.planar),
     )
 
 

@@ -1,4 +1,4 @@
-"""The tree of bodies: which joint carries each, its parent, and an order from the roots outwards."""
+"""The tree of bodies: which joint carries each, its parent, an order from the roots; and what is left."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from linkwind.errors import MechanismError
 from linkwind.scenario import Joint, Scenario
+from linkwind.scenario.topology import carries
 from linkwind.spatial import Array
 
 WORLD = -1
@@ -47,8 +48,27 @@ class Carrier:
         return np.array(self.joint.axis if self.joint else (0.0, 0.0, 1.0))
 
 
-def carriers(scenario: Scenario) -> list[Carrier]:
-    """Return the joint of each body, in scenario order; bodies without one get a root joint.
+@dataclass(frozen=True)
+class Loop:
+    """A joint that closes a loop.
+
+    Attributes:
+        joint: the scenario's.
+        parent: index of its parent, or -1 for the world.
+        child: index of its child.
+        item: where it stands in the scenario, for errors.
+    """
+
+    joint: Joint
+    parent: int
+    child: int
+    item: str
+
+
+def carriers(scenario: Scenario) -> tuple[list[Carrier], list[Loop]]:
+    """Return the joint that carries each body, in scenario order, and the joints that close loops.
+
+    Bodies without a joint get one to the world.
 
     Raises:
         MechanismError: a joint would leave the plane of a planar mechanism.
@@ -59,12 +79,18 @@ def carriers(scenario: Scenario) -> list[Carrier]:
         Carrier(f"world-{body.name}", root, WORLD, None, f"{scenario.source}: bodies[{i}]")
         for i, body in enumerate(scenario.bodies)
     ]
+    loops = []
+    carrying = carries((joint.type, joint.parent, joint.child) for joint in scenario.joints)
     for i, joint in enumerate(scenario.joints):
         item = f"{scenario.source}: joints[{i}]"
         if scenario.planar:
             _check_planar(joint, item)
-        found[index[joint.child]] = Carrier(joint.name, joint.type, index[joint.parent], joint, item)
-    return found
+        parent, child = index[joint.parent], index[joint.child]
+        if carrying[i]:
+            found[child] = Carrier(joint.name, joint.type, parent, joint, item)
+        else:
+            loops.append(Loop(joint, parent, child, item))
+    return found, loops
 
 
 def order(parents: list[int]) -> list[int]:
@@ -83,8 +109,8 @@ def _check_planar(joint: Joint, item: str) -> None:
     """A single number as inertia says nothing about turning out of the plane."""
     if joint.type in ("spherical", "free"):
         raise MechanismError(
-            f"{item}.type: expected fixed, revolute, prismatic or planar, because every inertia is a "
-            f'single number; got "{joint.type}". Give 6 numbers for the inertia of each body.'
+            f"{item}.type: expected fixed, revolute, prismatic, planar or distance, because every inertia is "
+            f'a single number; got "{joint.type}". Give 6 numbers for the inertia of each body.'
         )
     x, y, z = joint.axis
     if joint.type in ("revolute", "planar") and (x or y):

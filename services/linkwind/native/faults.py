@@ -30,8 +30,11 @@ _NUMERICS = {
         "Take a smaller step"),
     9: ("joint of body {item}", "a motion that keeps it closed", "none after ten corrections",
         "Take a smaller step"),
+    10: ("joint {item}", "bodies that close the loop", "a position from which they do not reach",
+        "Check points, lengths and the start; a smaller step may help"),
 }  # fmt: skip
 _UNNAMED = (3, 6)  # the item is no body
+_CLOSURES = (10,)  # it is a joint that closes a loop
 _ARGUMENTS = {
     20: ("h", "a positive macro step [s]"),
     21: ("nodes", "1 to 8 distinct finite nodes"),
@@ -41,8 +44,10 @@ _ARGUMENTS = {
 }
 
 
-def fail(status: int, fault: Fault, bodies: Sequence[str], arguments: dict[str, Any]) -> NoReturn:
-    """Raise what the core reported.
+def fail(
+    status: int, fault: Fault, names: tuple[Sequence[str], Sequence[str]], arguments: dict[str, Any]
+) -> NoReturn:
+    """Raise what the core reported; ``names`` are those of bodies and of closures.
 
     Raises:
         ValueError: one of the ``arguments`` of the call makes no sense.
@@ -51,7 +56,7 @@ def fail(status: int, fault: Fault, bodies: Sequence[str], arguments: dict[str, 
     if status in _ARGUMENTS:
         name, expected = _ARGUMENTS[status]
         raise ValueError(f"{name}: expected {expected}; got {arguments[name]}. Correct the call.")
-    item = str(fault.item) if status in _UNNAMED else bodies[fault.item]
+    item = str(fault.item) if status in _UNNAMED else names[status in _CLOSURES][fault.item]
     subject, expected, found, repair = (text.format(item=item) for text in _NUMERICS[status])
     raise SimulationError(
         f"{subject}: expected {expected}; got {found}, {fault.time:.9g} s into the step. {repair}."

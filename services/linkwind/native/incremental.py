@@ -43,7 +43,7 @@ class Incremental(Multibody):
         if body >= 0:
             kind = next(name for name, code in JOINT_TYPES.items() if code == tables.joint_type[body])
             raise MechanismError(
-                f"joint of body {self._names[body]}: expected a hinge about z on another body, or a body "
+                f"joint of body {self._names[0][body]}: expected a hinge about z on another body, or a body "
                 "free in the plane (planar, to the world, at its centre of mass), no spring, no damper: all "
                 f"that the method incremental knows; got one of type {kind}. Use reduced or cfe."
             )

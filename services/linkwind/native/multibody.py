@@ -16,7 +16,10 @@ from linkwind.native.faults import Fault, fail
 from linkwind.native.library import declare
 from linkwind.native.results import AffineStep, Evaluation, Integrator
 from linkwind.native.tables import (
+    DISTANCE,
     JOINT_TYPES,
+    KEEP_ROTATION,
+    KEEP_TRANSLATION,
     NQ,
     NV,
     QUATERNION_AT,
@@ -27,18 +30,24 @@ from linkwind.native.tables import (
 )
 from linkwind.spatial import Array, Motion, address
 
-__all__ = ["JOINT_TYPES", "NQ", "NV", "AffineStep", "Evaluation", "Integrator", "Multibody", "Tables"]
+__all__ = [
+    "DISTANCE", "JOINT_TYPES", "KEEP_ROTATION", "KEEP_TRANSLATION", "NQ", "NV", "QUATERNION_AT",
+    "AffineStep", "Evaluation", "Integrator", "Multibody", "Tables",
+]  # fmt: skip
 
 
 _pointer, _int, _double = ctypes.c_void_p, ctypes.c_int32, ctypes.c_double
-_size = declare("lw_multibody_size", [_int] * 3, ctypes.c_size_t)
+_size = declare("lw_multibody_size", [_pointer], ctypes.c_size_t)
 _init = declare("lw_multibody_init", [_pointer] * 3)
 _advance = declare("lw_multibody_advance", [_pointer] * 2)
 _affine_size = declare("lw_affine_size", [_int], ctypes.c_size_t)
 _affine_inertia = declare("lw_affine_inertia", [_pointer] * 4 + [_double, _pointer], None)
 _advance_affine = declare("lw_multibody_advance_affine", [_pointer] * 3)
 _motion = declare("lw_multibody_motion", [_pointer] * 6, None)
-_evaluate = declare("lw_multibody_evaluate", [_pointer] * 9)
+_evaluate = declare("lw_multibody_evaluate", [_pointer] * 6)
+_row_count = declare("lw_closure_row_count", [_pointer], _int)
+_closures = declare("lw_multibody_closures", [_pointer] * 4, None)
+_close = declare("lw_multibody_close", [_pointer] * 3)
 _energy = declare("lw_multibody_energy", [_pointer] * 4, None)
 _joint_gap = declare("lw_multibody_joint_gap", [_pointer] * 3, _double)
 _repeat = declare("lw_multibody_repeat", [_pointer, _pointer, _int])
@@ -46,6 +55,7 @@ _repeat = declare("lw_multibody_repeat", [_pointer, _pointer, _int])
 KNOWN_ARRAYS = 32  # whose addresses are remembered
 _macro_step = struct.Struct("@PdPPPddiiiPPP")
 _affine = struct.Struct("@PPPPPP")
+_evaluation = struct.Struct("@PPPPP")
 
 
 class Multibody:
@@ -57,43 +67,54 @@ class Multibody:
     Attributes:
         n: number of bodies.
         nq: number of coordinates.
-        nv: number of degrees of freedom.
+        nv: number of degrees of freedom of the tree of bodies.
+        closures: number of joints that close loops of it.
+        rows: number of equations that they are.
         state_size: length of a state: q, v, and the substep [s] that dopri5 would take next (0 = unknown).
     """
 
-    def __init__(self, tables: Tables, bodies: Sequence[str] = ()) -> None:
+    def __init__(self, tables: Tables, bodies: Sequence[str] = (), closures: Sequence[str] = ()) -> None:
         """Build the mechanism.
 
         Args:
             tables: the mechanism.
             bodies: names of the bodies, for errors; their numbers if not given.
+            closures: likewise of the joints that close loops.
 
         Raises:
             MechanismError: a table has a wrong shape or a wrong value.
         """
         arrays = contiguous(tables)
         self.tables = tables
-        self._names = [f'"{name}"' for name in bodies] or [str(i) for i in range(len(tables.parent))]
         self.n, self.nq, self.nv = len(tables.parent), len(tables.rest), len(tables.stiffness)
+        self.closures = len(tables.closure_rows)
+        self._names = _quoted(bodies, self.n), _quoted(closures, self.closures)
         self.state_size = self.nq + self.nv + 1
-        self._memory = np.zeros((_size(self.n, self.nq, self.nv) + 7) // 8)
+        pointers = {name: array.ctypes.data for name, array in arrays.items()}
+        native = CTables(n=self.n, nq=self.nq, nv=self.nv, closures=self.closures, **pointers)
+        self.rows = _row_count(ctypes.addressof(native))
+        self._memory = np.zeros((_size(ctypes.addressof(native)) + 7) // 8)
         self._state, self._next = np.zeros(self.state_size), np.zeros(self.state_size)
         self._work, self._energies, self._fault = np.zeros(2), np.zeros(2), Fault()
         buffers = (self._memory, self._state, self._next, self._work, self._energies)
         self._model, self._state_at, self._next_at, self._work_at, self._energies_at = map(address, buffers)
-        # joint accelerations, then three rows of six for every body
-        self._results = np.zeros(self.nv + 18 * self.n)
-        first = address(self._results)
-        self._results_at = [first + 8 * (self.nv if i else 0) + 48 * self.n * max(0, i - 1) for i in range(4)]
+        self._fault_at = ctypes.addressof(self._fault)
+        self._results, self._evaluation = self._evaluation_of()
         self._step = ctypes.create_string_buffer(_macro_step.size)
-        self._fault_at, self._step_at = ctypes.addressof(self._fault), ctypes.addressof(self._step)
+        self._step_at = ctypes.addressof(self._step)
         self._affine = ctypes.create_string_buffer(_affine.size)
         self._met, self._scratch = np.zeros(0), np.zeros(0)  # made when an affine wrench comes
         self._known: dict[int, tuple[Array, int]] = {}
-        pointers = {name: array.ctypes.data for name, array in arrays.items()}
-        native = CTables(n=self.n, nq=self.nq, nv=self.nv, **pointers)
         if status := _init(self._model, ctypes.addressof(native), self._fault_at):
             refuse(tables, status, self._fault.item)
+
+    def _evaluation_of(self) -> tuple[Array, ctypes.Array[ctypes.c_char]]:
+        """Return room for joint accelerations, three rows of six a body and one a closure; and its struct."""
+        results = np.zeros(self.nv + 18 * self.n + 6 * self.closures)
+        starts = np.cumsum([0, self.nv, 6 * self.n, 6 * self.n, 6 * self.n])
+        struct = ctypes.create_string_buffer(_evaluation.size)
+        _evaluation.pack_into(struct, 0, *(address(results) + 8 * int(start) for start in starts))
+        return results, struct
 
     def initial_state(self, q: Array, v: Array) -> Array:
         """Return the state with coordinates ``q``, shape (nq,), and velocities ``v``, shape (nv,).
@@ -260,13 +281,37 @@ class Multibody:
             self._refuse("wrench", (self.n, 6), wrench)
         status = _evaluate(
             self._model, self._state_at, self._locate(wrench), self._locate_added(added_inertia),
-            *self._results_at, self._fault_at,
+            ctypes.addressof(self._evaluation), self._fault_at,
         )  # fmt: skip
         if status:
             fail(status, self._fault, self._names, {})
-        result, nv, n = self._results.copy(), self.nv, self.n
-        bodies = result[nv:].reshape(3, n, 6)
-        return Evaluation(result[:nv], bodies[0], bodies[1], bodies[2])
+        result, nv = self._results.copy(), self.nv
+        sixes = result[nv:].reshape(-1, 6)
+        bodies = sixes[: 3 * self.n].reshape(3, self.n, 6)
+        return Evaluation(result[:nv], bodies[0], bodies[1], bodies[2], sixes[3 * self.n :])
+
+    def violations(self, state: Array) -> tuple[Array, Array]:
+        """Return by how much each equation of the closures is violated, and how that depends on the motion.
+
+        Returns:
+            Violations [m; of directions that should be square, the cosine], shape (rows,), and their Jacobian
+            J, shape (rows, nv): they change by J v.
+        """
+        self._take(state)
+        value, jacobian = np.zeros(self.rows), np.zeros((self.rows, self.nv))
+        _closures(self._model, self._state_at, address(value), address(jacobian))
+        return value, jacobian
+
+    def close(self, state: Array) -> Array:
+        """Return the state nearest to ``state``, measured by kinetic energy, that closes all loops.
+
+        Raises:
+            SimulationError: none is found near by.
+        """
+        self._take(state)
+        if status := _close(self._model, self._state_at, self._fault_at):
+            fail(status, self._fault, self._names, {})
+        return self._state.copy()
 
     def energy(self, state: Array) -> tuple[float, float]:
         """Return kinetic and potential energy [J]: gravity from the origin of W, springs from rest."""
@@ -275,7 +320,7 @@ class Multibody:
         return float(self._energies[0]), float(self._energies[1])
 
     def joint_gap(self, motion: Motion) -> float:
-        """Return the largest distance [m] by which given poses violate a joint.
+        """Return the largest distance [m] by which given poses violate a joint, closures included.
 
         Fixed, revolute and spherical joints: the distance of the joint's two points; prismatic: off the
         axis; planar: off the plane; free: 0.
@@ -312,3 +357,7 @@ class Multibody:
     @staticmethod
     def _refuse(name: str, shape: tuple[int, ...], array: Array) -> None:
         raise ValueError(f"{name}: expected shape {shape}; got {array.shape}. One entry per node and body.")
+
+
+def _quoted(names: Sequence[str], count: int) -> list[str]:
+    return [f'"{name}"' for name in names] or [str(i) for i in range(count)]

@@ -41,9 +41,12 @@ class Evaluation(NamedTuple):
         reaction: of the parent on the child through the joint, springs and dampers included, force first
             [N, N·m], shape (n, 6), in W at the joint's point on the child.
         total_wrench: wrench - A a [N, N·m], shape (n, 6), force first, in W at the centres of mass.
+        closure_reaction: of the first on the second body of each joint that closes a loop [N, N·m], shape
+            (c, 6), force first, in W at the joint's point on the second.
     """
 
     joint_acceleration: Array
     acceleration: Array
     reaction: Array
     total_wrench: Array
+    closure_reaction: Array

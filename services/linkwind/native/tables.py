@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, NoReturn
 
 import numpy as np
@@ -24,6 +24,7 @@ JOINT_TYPES: dict[str, int] = {
 }
 NQ: dict[str, int] = dict(zip(JOINT_TYPES, (0, 1, 1, 3, 4, 7), strict=True))
 NV: dict[str, int] = dict(zip(JOINT_TYPES, (0, 1, 1, 3, 3, 6), strict=True))
+KEEP_TRANSLATION, KEEP_ROTATION, DISTANCE = (1, 2, 4), (8, 16, 32), 64  # bits of closure_rows
 QUATERNION_AT = {JOINT_TYPES["spherical"]: 0, JOINT_TYPES["free"]: 3}
 
 
@@ -47,6 +48,13 @@ class Tables:
         gravity: [m/s²], shape (3,), in W.
         stiffness, damping: of each degree of freedom [N/m or N·m/rad; times s], shape (nv,).
         rest: coordinates without spring force, shape (nq,); quaternions where q has them.
+        closure_body: the two bodies of each of c joints that close loops, -1 for the world, int32, shape
+            (c, 2).
+        closure_rows: what they keep: sums of ``KEEP_TRANSLATION`` along and ``KEEP_ROTATION`` about the axes
+            of the frame on the first body; or ``DISTANCE``; int32, shape (c,).
+        closure_point: joint frame origins on both bodies, as parent_point, shape (c, 2, 3).
+        closure_rotation: joint frames to body frames, shape (c, 2, 3, 3).
+        closure_length: distance that a ``DISTANCE`` keeps [m], shape (c,).
     """
 
     parent: Index
@@ -64,13 +72,18 @@ class Tables:
     stiffness: Array
     damping: Array
     rest: Array
+    closure_body: Index = field(default_factory=lambda: np.zeros((0, 2), np.int32))
+    closure_rows: Index = field(default_factory=lambda: np.zeros(0, np.int32))
+    closure_point: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))
+    closure_rotation: Array = field(default_factory=lambda: np.zeros((0, 2, 3, 3)))
+    closure_length: Array = field(default_factory=lambda: np.zeros(0))
 
 
 class CTables(ctypes.Structure):
     """``lw_tables`` of the library."""
 
-    _fields_ = [(name, ctypes.c_int32) for name in ("n", "nq", "nv")] + [
-        (field.name, ctypes.c_void_p) for field in fields(Tables)
+    _fields_ = [(name, ctypes.c_int32) for name in ("n", "nq", "nv", "closures")] + [
+        (table.name, ctypes.c_void_p) for table in fields(Tables)
     ]
 
 
@@ -91,17 +104,27 @@ _CHECKS = {
     53: ("stiffness", "finite numbers"),
     54: ("damping", "finite numbers"),
     55: ("rest", "finite coordinates, quaternions not zero"),
+    56: ("closure_body", "two different bodies, -1 for the world"),
+    57: ("closure_rows", "bits of directions to keep, or a distance"),
+    58: ("closure_point", "finite numbers"),
+    59: ("closure_rotation", "rotation matrices"),
+    60: ("closure_length", "a distance above zero"),
 }
 
 
-def _shapes(n: int, nq: int, nv: int) -> dict[str, tuple[int, ...]]:
+_INTEGERS = ("parent", "order", "joint_type", "q_index", "v_index", "closure_body", "closure_rows")
+
+
+def _shapes(n: int, nq: int, nv: int, closures: int) -> dict[str, tuple[int, ...]]:
     integers = dict.fromkeys(("parent", "order", "joint_type", "q_index", "v_index"), (n,))
     points = dict.fromkeys(("parent_point", "child_point"), (n, 3))
     rotations = dict.fromkeys(("parent_rotation", "child_rotation"), (n, 3, 3))
     degrees = dict.fromkeys(("stiffness", "damping"), (nv,))
+    closed = {"body": (2,), "rows": (), "point": (2, 3), "rotation": (2, 3, 3), "length": ()}
     return (
         {"mass": (n,), "inertia": (n, 6), "gravity": (3,), "rest": (nq,)}
         | integers | points | rotations | degrees
+        | {f"closure_{name}": (closures, *shape) for name, shape in closed.items()}
     )  # fmt: skip
 
 
@@ -109,8 +132,8 @@ def contiguous(tables: Tables) -> dict[str, NDArray[Any]]:
     """Return the tables as contiguous arrays of the right type, or raise MechanismError for a shape."""
     n, nq, nv = np.size(tables.parent), np.size(tables.rest), np.size(tables.stiffness)
     arrays = {}
-    for name, shape in _shapes(n, nq, nv).items():
-        wanted = np.int32 if name in ("parent", "order", "joint_type") or "index" in name else np.float64
+    for name, shape in _shapes(n, nq, nv, np.size(tables.closure_rows)).items():
+        wanted = np.int32 if name in _INTEGERS else np.float64
         arrays[name] = np.ascontiguousarray(getattr(tables, name), dtype=wanted)
         if np.shape(getattr(tables, name)) != shape:
             raise MechanismError(

@@ -18,6 +18,7 @@ from linkwind.log.origin import origin
 from linkwind.log.reader import Log, open_log
 from linkwind.log.tables import Trajectory, seconds
 from linkwind.report.flow import Flow, survey
+from linkwind.scenario.topology import carries
 from linkwind.spatial import Array
 
 
@@ -92,8 +93,18 @@ class Run:
     @property
     def joint_of(self) -> list[Mapping[str, Any] | None]:
         """The scenario's joint that carries each body; None where the body moves freely."""
-        carried = {joint["child"]: joint for joint in self.scenario.get("joints", ())}
+        carried = {joint["child"]: joint for joint, free in self._joints if free}
         return [carried.get(name) for name in self.bodies]
+
+    @property
+    def closures(self) -> list[Mapping[str, Any]]:
+        """The scenario's joints that close loops."""
+        return [joint for joint, free in self._joints if not free]
+
+    @property
+    def _joints(self) -> list[tuple[Mapping[str, Any], bool]]:
+        joints = self.scenario.get("joints", ())
+        return list(zip(joints, carries((j["type"], j["parent"], j["child"]) for j in joints), strict=True))
 
     @cached_property
     def planar(self) -> bool:
@@ -178,6 +189,7 @@ def no_trajectory(n: int) -> Trajectory:
     blank: dict[str, Any] = dict.fromkeys(Trajectory._fields, np.empty(0))
     blank |= {name: np.empty((0, n, width)) for name, width in widths.items()}
     blank |= {"q": np.empty((0, 0)), "v": np.empty((0, 0)), "step": np.empty(0, np.uint64)}
+    blank |= {"closure_reaction": np.empty((0, 0, 6))}
     return Trajectory(**blank)
 
 

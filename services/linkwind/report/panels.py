@@ -90,16 +90,22 @@ def _aerodynamic(run: Run) -> dict[str, Any]:
 
 
 def _joints(run: Run) -> dict[str, Any] | None:
-    jointed = [(i, joint["name"]) for i, joint in enumerate(run.joint_of) if joint is not None]
-    if not jointed:
+    path, bodies = run.trajectory, len(run.bodies)
+    forces = [(i, joint["name"], path.reaction[:, i]) for i, joint in enumerate(run.joint_of) if joint]
+    forces += [
+        (bodies + i, joint["name"], path.closure_reaction[:, i]) for i, joint in enumerate(run.closures)
+        if path.closure_reaction.shape[1]
+    ]  # fmt: skip
+    if not forces:
         return None
     axes = _MOTION_AXES[run.planar]
     rows = [
-        _row(label, *(_curve(run, name, i, run.trajectory.reaction[:, i, axis]) for i, name in jointed))
+        _row(label, *(_curve(run, name, i, force[:, axis]) for i, name, force in forces))
         for axis, label in zip(axes, _labels("R", axes, "N"), strict=True)
     ]
     rows += _gap(run)
-    return _panel("Joints", rows, "Force of the parent on the child, in its colour.")
+    last = " Joints that close loops come last." if run.closures else ""
+    return _panel("Joints", rows, f"Force of the parent on the child, in its colour.{last}")
 
 
 def _energy(run: Run) -> dict[str, Any]:

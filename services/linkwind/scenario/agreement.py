@@ -66,46 +66,17 @@ def _inertias(scenario: Scenario) -> Iterator[Problem]:
 
 def _joints(scenario: Scenario) -> Iterator[Problem]:
     bodies = [body.name for body in scenario.bodies]
-    parents: dict[str, str] = {}
-    by_child: dict[str, str] = {}
     for index, joint in enumerate(scenario.joints):
         path: Path = ("joints", index)
-        unknown = False
         for key, word, known in (
             ("parent", joint.parent, [*bodies, "world"]),
             ("child", joint.child, bodies),
         ):
             if word not in known:
-                unknown = True
                 yield choice((*path, key), "one of the bodies", known, word)
-        if unknown:
-            continue
         if joint.parent == joint.child:
             advice = "Name the body that carries it, or world."
             yield Problem((*path, "parent"), "another body than the child", show(joint.parent), advice)
-        elif joint.child in by_child:
-            expected = f"a body without a parent joint ({by_child[joint.child]} is the one of {joint.child})"
-            advice = "Swap parent and child, or remove a joint: loops are not supported."
-            yield Problem((*path, "child"), expected, show(joint.child), advice)
-        else:
-            by_child[joint.child] = joint.name
-            parents[joint.child] = joint.parent
-            cycle = _cycle(joint.child, parents)
-            if cycle:
-                expected = "joints that form a tree"
-                advice = "Remove a joint: loops are not supported."
-                yield Problem((*path, "parent"), expected, "the loop " + " → ".join(cycle), advice)
-                del parents[joint.child]  # reported once
-
-
-def _cycle(body: str, parents: dict[str, str]) -> list[str]:
-    """Return the bodies from ``body`` up to itself, or nothing where the way up ends."""
-    way = [body]
-    while way[-1] in parents:
-        way.append(parents[way[-1]])
-        if way[-1] == body:
-            return way
-    return []
 
 
 def _method(scenario: Scenario) -> Iterator[Problem]:

@@ -22,7 +22,7 @@ from linkwind.scenario.quantities import (
 )
 from linkwind.scenario.shapes import Circle, Ellipse, Plate, Polygon, Rectangle
 
-JointType = Literal["fixed", "revolute", "prismatic", "planar", "spherical", "free"]
+JointType = Literal["fixed", "revolute", "prismatic", "planar", "spherical", "free", "distance"]
 
 Inertia6 = tuple[float, float, float, float, float, float]
 
@@ -128,13 +128,17 @@ class Joint(Section):
     """A joint between a parent (or the world) and a child.
 
     The joint frame has its z axis along ``axis``; the joint is at zero where the body frames of parent
-    and child are parallel and its two points coincide.
+    and child are parallel and its two points coincide. A joint whose child has a joint before it in the
+    file, or would come to carry its own parent, closes a loop; so does every ``distance``. Its axes on the
+    child are where they lie at the start.
     """
 
     name: Name = Field(description="Name, a letter followed by letters, digits and _")
-    type: JointType = Field(description="What the joint leaves free")
+    type: JointType = Field(
+        description="What the joint leaves free; distance keeps two points as far apart as they start"
+    )
     parent: str = Field(description='Name of a body, or "world"')
-    child: str = Field(description="Name of a body; each body is the child of at most one joint")
+    child: str = Field(description="Name of a body; its first joint carries it, more of them close loops")
     parent_point: Vector = quantity(
         "The joint's point in the parent's body frame, from its centre of mass (world: in the world)",
         "m",
