@@ -38,7 +38,7 @@ def import_(
     ] = None,
     at: Annotated[
         list[str] | None,
-        typer.Option("--at", metavar="JOINT=VALUE", help="Where a joint starts [rad or m]; repeatable."),
+        typer.Option("--at", metavar="JOINT=VALUE", help="Where a joint starts, in rad or m; repeatable."),
     ] = None,
     repair_inertia: Annotated[
         bool, typer.Option("--repair-inertia", help="Change inertias that no body can have, and list them.")

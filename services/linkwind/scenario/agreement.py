@@ -166,7 +166,7 @@ def _masses(scenario: Scenario) -> Iterator[Problem]:
     """A body moves only if it, a model or what hangs on it has inertia."""
     adding = [entry for entry in scenario.providers if entry.model in ("plate", "flow", "fmu")]
     given = {name for entry in adding for name in entry.bodies}
-    parents = {joint.child: joint.parent for joint in scenario.joints}
+    parents = {joint.child: joint.parent for joint in reversed(scenario.joints)}
     for body in scenario.bodies:  # what carries mass has it
         name = body.name if body.mass > 0.0 else "world"
         while name != "world" and name not in given:

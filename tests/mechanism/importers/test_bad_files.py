@@ -62,7 +62,7 @@ WRONG = [
     (TWO.replace('value="1"', 'value="-1"'),
      "3: <mass>: expected a mass of at least 0; got -1. Correct it."),
     (TWO.replace('value="1"', 'value="0"'),
-     '3: <link name="b">: expected a mass above 0, as it has inertia and moves; got 0. Correct it.'),
+     '3: <link name="b">: expected a mass above 0, as it moves; got 0. Correct it.'),
     (TWO.replace("</joint>", '<dynamics damping="-1"/></joint>'),
      "4: <dynamics>: expected damping of at least 0; got -1. A negative one would feed energy."),
 ]  # fmt: skip

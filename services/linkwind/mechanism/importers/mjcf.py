@@ -167,8 +167,16 @@ class _Reader:
         out("joint limits", "joints turn and slide without end", _each(joints, m.jnt_limited))
         out("joint frictions", "dry friction is not modelled", _each(of, m.dof_frictionloss))
         out("armatures", "rotors have no inertia: the motion is another", _each(of, m.dof_armature))
-        out("springs not linear", "only their linear part is there", _each(joints, m.jnt_stiffnesspoly))
-        out("dampers not linear", "only their linear part is there", _each(of, m.dof_dampingpoly))
+        out(
+            "springs not linear",
+            "only their linear part is there",
+            _each(joints, getattr(m, "jnt_stiffnesspoly", None)),
+        )
+        out(
+            "dampers not linear",
+            "only their linear part is there",
+            _each(of, getattr(m, "dof_dampingpoly", None)),
+        )
         for what, why, kind, count in (
             ("equality constraints", "they do not hold", "EQUALITY", m.neq),
             ("tendons", "there are none, nor their springs, dampers and limits", "TENDON", m.ntendon),
@@ -189,5 +197,7 @@ class _Reader:
 
 def _each(names: list[str], values: Any) -> list[str]:
     """Return the names with a value that is not zero, each once, in order."""
+    if values is None:  # of a later version of MuJoCo
+        return []
     rows = np.reshape(np.asarray(values), (len(names), -1)) if len(names) else np.zeros((0, 1))
     return list(dict.fromkeys(name for name, row in zip(names, rows, strict=True) if np.any(row)))

@@ -24,13 +24,13 @@ def settle(model: Model, file: Path, repair: bool) -> None:
         InputError: nothing that moves has mass, or a moving part has an inertia that no body can have.
     """
     _forget_round_off(model)
-    while _merge_one(model) or _drop_one(model):
-        pass
+    _keep(model, _merged(model))
+    _keep(model, _idle(model))
+    if not model.parts:
+        raise InputError(f"{file}: expected a link with mass; got none. Give links inertials.")
     for part in model.parts:
-        if part.mass == 0.0 and not part.bare:
-            raise InputError(
-                f"{part.item}: expected a mass above 0, as it has inertia and moves; got 0. Correct it."
-            )
+        if part.mass == 0.0 and (part.joint.type == "free" or not part.bare):
+            raise InputError(f"{part.item}: expected a mass above 0, as it moves; got 0. Correct it.")
     impossible = [part for part in model.parts if not part.possible()]
     if impossible and not repair:
         raise InputError("\n".join(map(_impossible, impossible)))
@@ -39,8 +39,6 @@ def settle(model: Model, file: Path, repair: bool) -> None:
         _repair(part)
         why = "the smallest moment raised to the least that a body can have"
         model.leave_out(REPAIRED, why, [f"{part.name} ({before} → {_moments(part)} kg·m²)"])
-    if not model.parts:
-        raise InputError(f"{file}: expected a link with mass; got none. Give links inertials.")
 
 
 def _forget_round_off(model: Model) -> None:
@@ -50,51 +48,50 @@ def _forget_round_off(model: Model) -> None:
             part.inertia = np.zeros((3, 3))
 
 
-def _merge_one(model: Model) -> bool:
-    """Add one part to another that it is fixed to, where one of the two cannot be a body by itself."""
-    for i, part in enumerate(model.parts):
+def _merged(model: Model) -> dict[int, int]:
+    """Add parts to those that they are fixed to, where one of the two cannot be a body by itself.
+
+    Returns:
+        Which part each of them is in now, by index; WORLD for what is fixed to the world.
+    """
+    into: dict[int, int] = {}
+    for i, part in enumerate(model.parts):  # parents before children
+        at = into.get(part.parent, part.parent)
         if part.joint.type != "fixed":
             continue
-        if part.parent == WORLD:
-            if not part.body:
-                _remove(model, i, "fixed to the world")
-                return True
+        if at == WORLD and not part.body:
+            into[i] = WORLD
+            model.leave_out(MERGED, "fixed to the world", [f"{part.name} → world"])
+        elif at != WORLD and not (part.body and model.parts[at].body):
+            into[i] = at
+            model.parts[at].take_in(part)
+            model.leave_out(MERGED, "the motion is the same", [f"{part.name} → {model.parts[at].name}"])
+    return into
+
+
+def _idle(model: Model) -> dict[int, int]:
+    """Find moving parts without mass on which nothing hangs: nothing feels them. Their pictures stay."""
+    into: dict[int, int] = {}
+    carrying: set[int] = set()
+    for i, part in reversed(list(enumerate(model.parts))):
+        if not part.bare or i in carrying:
+            carrying.add(part.parent)
             continue
-        parent = model.parts[part.parent]
-        if not (part.body and parent.body):
-            parent.take_in(part)
-            _remove(model, i, "", f"{part.name} → {parent.name}")
-            return True
-    return False
+        into[i] = part.parent
+        if part.parent != WORLD:
+            model.parts[part.parent].pictures += part.pictures
+        model.leave_out(IDLE, "they do not move the rest", [f"{part.name} ({part.joint.name})"])
+    return into
 
 
-def _drop_one(model: Model) -> bool:
-    """Leave out one moving part at the end of a branch that has no mass: nothing feels it."""
-    carrying = {part.parent for part in model.parts}
-    for i, part in enumerate(model.parts):
-        if part.bare and i not in carrying:
-            if part.parent != WORLD:
-                model.parts[part.parent].pictures += part.pictures
-            model.leave_out(IDLE, "they do not move the rest", [f"{part.name} ({part.joint.name})"])
-            _take_out(model, i)
-            return True
-    return False
-
-
-def _remove(model: Model, index: int, why: str, item: str = "") -> None:
-    model.leave_out(MERGED, why or "the motion is the same", [item or f"{model.parts[index].name} → world"])
-    _take_out(model, index)
-
-
-def _take_out(model: Model, index: int) -> None:
-    """Hang the children of a part on its parent, and renumber."""
-    parent = model.parts[index].parent
-    del model.parts[index]
-    for part in model.parts:
-        if part.parent == index:
-            part.parent = parent
-        if part.parent > index:
-            part.parent -= 1
+def _keep(model: Model, into: dict[int, int]) -> None:
+    """Keep the parts that are in no other one, and renumber."""
+    kept = [i for i in range(len(model.parts)) if i not in into]
+    place = {i: k for k, i in enumerate(kept)} | {WORLD: WORLD}
+    parts = [model.parts[i] for i in kept]
+    for part in parts:
+        part.parent = place[into.get(part.parent, part.parent)]
+    model.parts = parts
 
 
 def _repair(part: Part) -> None:

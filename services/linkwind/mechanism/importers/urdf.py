@@ -115,7 +115,8 @@ def _order(root: Element, links: Mapping[str, Element], by_child: Mapping[str, E
     order = list(roots)
     for name in order:  # grows on the way
         order += children[name]
-    lost = next((name for name in links if name not in set(order)), None)
+    reached = set(order)
+    lost = next((name for name in links if name not in reached), None)
     if lost is not None:
         by_child[lost].refuse("joints that form a tree", f'a loop through "{lost}"', "URDF describes trees.")
     return order
