@@ -9,7 +9,7 @@ enum {
     LANES = 16 /* rows are worked on from and up to multiples of it: no remainders, aligned writes */
 };
 
-/* What is read and what is written do not overlap; the compiler cannot check it for eighteen pointers. */
+/* What is read and what is written for a row do not overlap; the compiler cannot check it for eighteen pointers. */
 #if defined(__clang__)
 #define LW_INDEPENDENT _Pragma("clang loop vectorize(assume_safety)")
 #elif defined(__GNUC__)
@@ -25,6 +25,7 @@ typedef struct {
     const lw_lattice *lattice;
     int32_t shift_x, shift_y;
     int32_t begin, end; /* columns that have a source */
+    int32_t down;       /* rows come from the last to the first */
     float stream[LW_DIRECTIONS];
 } step_job;
 
@@ -133,7 +134,7 @@ LW_INLINE int32_t rounded(int32_t end, int32_t nx) { return smaller(nx, (end + L
 LW_INLINE void advance_row(const step_job *job, int32_t j) {
     const lw_lattice *lattice = job->lattice;
     const int32_t nx = lattice->nx, ny = lattice->ny, source = j + job->shift_y;
-    if (j == 0 || j == ny - 1 || source < 1 || source > ny - 2 || job->begin >= job->end) {
+    if (j == 0 || j == ny - 1 || source < 1 || source > ny - 2) {
         fill(job, j, 0, nx);
         return;
     }
@@ -157,9 +158,9 @@ LW_INLINE void advance_row(const step_job *job, int32_t j) {
 }
 
 LW_INLINE void advance_rows(const step_job *step, int32_t part) {
-    const int32_t end = smaller(step->lattice->ny, (part + 1) * ROWS);
-    for (int32_t j = part * ROWS; j < end; ++j) {
-        advance_row(step, j);
+    const int32_t ny = step->lattice->ny, end = smaller(ny, (part + 1) * ROWS);
+    for (int32_t k = part * ROWS; k < end; ++k) {
+        advance_row(step, step->down ? ny - 1 - k : k);
     }
 }
 
@@ -198,13 +199,14 @@ static void advance_part(const void *job, int32_t part) {
 #endif
 }
 
+/* In the same memory, a row is written LW_APART rows from its place, on that side from which the rows come: over
+ * rows that none of those to come reads, whose neighbours are two rows away at most in a window that moves. */
 void lw_lattice_step(lw_lattice *lattice, int32_t shift_x, int32_t shift_y) {
     const int32_t nx = lattice->nx, ny = lattice->ny;
-    step_job job = {.lattice = lattice};
-    job.shift_x = larger(-nx, smaller(nx, shift_x)); /* by more, nothing is left either */
-    job.shift_y = larger(-ny, smaller(ny, shift_y));
-    job.begin = larger(1, 1 - job.shift_x);
-    job.end = smaller(nx - 1, nx - 1 - job.shift_x);
+    step_job job = {.lattice = lattice, .shift_x = shift_x, .shift_y = shift_y};
+    job.begin = larger(1, 1 - shift_x);
+    job.end = smaller(nx - 1, nx - 1 - shift_x);
+    job.down = lattice->next > lattice->populations;
     lw_lattice_stream(lattice, job.stream);
     lw_threads_run(lattice->threads, advance_part, &job, (ny + ROWS - 1) / ROWS);
     float *const done = lattice->next;

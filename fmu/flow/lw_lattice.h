@@ -15,6 +15,7 @@
 
 enum {
     LW_DIRECTIONS = 9,
+    LW_APART = 3,         /* rows between the places of the populations in the same memory */
     LW_PLANE_PADDING = 16 /* floats behind the cells of a plane that may be read, never used */
 };
 
@@ -27,12 +28,14 @@ typedef struct {
     float shear_rate;               /* omega = 1 / (3 nu + 1/2), nu the kinematic viscosity [cells^2/step] */
     float stream[2];                /* velocity of the undisturbed fluid [cells/step] */
     int64_t plane;                  /* floats from one plane of populations to the next, at least
-                                       nx ny + LW_PLANE_PADDING */
+                                       nx ny + LW_PLANE_PADDING, in the same memory LW_APART rows more */
     float *populations, *next;      /* (9, ny, nx), planes `plane` apart: after the collision, less the weight
-                                       of the direction; exchanged by a step */
+                                       of the direction; exchanged by a step. One is LW_APART rows behind the
+                                       other, which moves a third less through the memory; or each has its
+                                       own, which threads need */
     const float *force;             /* (2, ny, nx) force on the fluid of each cell, x and y, in this step */
     float *blend;                   /* (nx) by how much each column relaxes; written by lw_lattice_init */
-    lw_threads *threads;            /* NULL: the caller alone */
+    lw_threads *threads;            /* NULL: the caller alone, row after row */
     int32_t instructions;           /* lw_instructions of this processor; written by lw_lattice_init */
 } lw_lattice;
 
@@ -46,8 +49,8 @@ LW_API void lw_lattice_init(lw_lattice *lattice);
 
 /* Go on by one step: move the window by whole cells, stream, add the force, collide, relax the fringe.
  * Cell (i, j) of the new window is (i + shift_x, j + shift_y) of the old one, to which the force belongs;
- * cells whose neighbours were not in the old window get the stream. A shift costs no time. The result has
- * the same bits for any number of threads and any set of instructions. */
+ * cells whose neighbours were not in the old window get the stream. A shift, by -1, 0 or 1 cells along each
+ * axis, costs no time. The result has the same bits for any number of threads and any set of instructions. */
 LW_API void lw_lattice_step(lw_lattice *lattice, int32_t shift_x, int32_t shift_y);
 
 /* Write means over blocks of stride x stride cells: velocity (2, ny / stride, nx / stride), which is momentum

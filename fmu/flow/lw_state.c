@@ -53,7 +53,7 @@ void lw_lattice_init(lw_lattice *lattice) {
     float stream[LW_DIRECTIONS];
     lw_lattice_stream(lattice, stream);
     for (int q = 0; q < LW_DIRECTIONS; ++q) {
-        for (int64_t i = 0; i < lattice->plane; ++i) {
+        for (int64_t i = 0; i < (int64_t)lattice->nx * lattice->ny + LW_PLANE_PADDING; ++i) {
             lattice->populations[q * lattice->plane + i] = lattice->next[q * lattice->plane + i] = stream[q];
         }
     }

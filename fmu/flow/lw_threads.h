@@ -18,7 +18,7 @@ typedef void lw_part(const void *job, int32_t part);
 LW_API lw_threads *lw_threads_create(int32_t count);
 
 /* Do all parts 0 ... parts - 1 of a job, and return when the last one is done. A team does one job at a
- * time; without one (NULL) the caller does every part. */
+ * time; without one (NULL) the caller does every part, in order. */
 void lw_threads_run(lw_threads *team, lw_part *part, const void *job, int32_t parts);
 
 LW_API void lw_threads_destroy(lw_threads *team);

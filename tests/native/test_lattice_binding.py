@@ -111,13 +111,14 @@ def test_moments_are_means_over_blocks_and_vorticity_their_curl():
     np.testing.assert_allclose(picture.vorticity[inside], exact[inside], rtol=0, atol=0.06 * 0.1 * k)
 
 
-def test_populations_are_a_view_of_the_present_buffer():
-    lattice = Lattice(64, 56, shear_rate=1.9, fringe=8)
+@pytest.mark.parametrize("threads", [1, 2])
+def test_populations_are_a_view_of_where_they_are(threads):
+    lattice = Lattice(64, 56, shear_rate=1.9, fringe=8, threads=threads)
     for _ in range(3):
         lattice.populations[:, 20:30, 20:30] += 1e-3
         before = lattice.populations
         lattice.step()
-        assert not np.shares_memory(before, lattice.populations)
+        assert before.ctypes.data != lattice.populations.ctypes.data
         assert np.abs(lattice.populations[:, 15:35, 15:35]).max() > 5e-4
 
 
@@ -172,4 +173,6 @@ def test_calls_out_of_range_are_refused_and_change_nothing():
         lattice.force_rows = (3, 65)
     with pytest.raises(ValueError, match=r"stride: expected 1 … 32"):
         lattice.moments(33)
+    with pytest.raises(ValueError, match="shift: expected -1, 0 or 1 cells"):
+        lattice.step((0, 2))
     assert lattice.state == state

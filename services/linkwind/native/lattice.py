@@ -22,6 +22,7 @@ Floats = NDArray[np.float32]
 DIRECTIONS = 9
 MAX_SPEED = 0.3  # cells/step: faster, and the error of the method, of third order in it, is no longer small
 _PADDING = 112  # floats behind each plane: without it all planes of 512 x 448 would share the same cache sets
+_APART = 3  # rows between the places that populations have by turns, in the memory of a single thread
 
 
 class _Lattice(ctypes.Structure):
@@ -97,13 +98,14 @@ class Lattice:
         if threads < 1:
             raise ValueError(f"threads: expected 1 or more; got {threads}")
         self.nx, self.ny, self.fringe, self.threads = nx, ny, fringe, threads
-        plane = -(-nx * ny // 16) * 16 + _PADDING
-        self._memory = _aligned(2 * DIRECTIONS * plane)
-        buffers = self._memory.reshape(2, DIRECTIONS, plane)[:, :, : nx * ny]
-        self._buffers: list[Floats] = [buffer.reshape(DIRECTIONS, ny, nx) for buffer in buffers]
+        plane = -(-nx * (ny + _APART) // 16) * 16 + _PADDING
+        self._memory = _aligned((1 if threads == 1 else 2) * DIRECTIONS * plane)
+        planes = self._memory.reshape(-1, DIRECTIONS, plane)
+        begins = (planes[0], planes[0, :, _APART * nx :]) if threads == 1 else planes
+        self._places: list[Floats] = [of[:, : nx * ny].reshape(DIRECTIONS, ny, nx) for of in begins]
         self.force = _aligned(2 * ny * nx).reshape(2, ny, nx)
         self._blend = np.zeros(nx, dtype=np.float32)
-        first, second = map(_address, self._buffers)
+        first, second = map(_address, self._places)
         rest = (plane, first, second, _address(self.force), _address(self._blend))
         self._struct = _Lattice(nx, ny, fringe, 0, ny, 0.0, (0.0, 0.0), *rest)
         self.shear_rate, self.stream = shear_rate, stream
@@ -127,9 +129,9 @@ class Lattice:
     def populations(self) -> Floats:
         """Populations after the last collision, less the weights of their directions.
 
-        Shape (9, ny, nx), a view of the present buffer: a step makes it the other one.
+        Shape (9, ny, nx), a view of where they are now: a step puts them elsewhere and may write over it.
         """
-        first, second = self._buffers
+        first, second = self._places
         return first if self._struct.populations == _address(first) else second
 
     @property
@@ -174,10 +176,17 @@ class Lattice:
         """Go on by one step.
 
         Args:
-            shift: of the window [cells]: cell (i, j) is (i + shift[0], j + shift[1]) of the window before, to
-                which ``force`` belongs. What was outside of it is the stream.
+            shift: of the window, by -1, 0 or 1 cells along each axis: cell (i, j) is
+                (i + shift[0], j + shift[1]) of the window before, to which ``force`` belongs. What was
+                outside of it is the stream.
+
+        Raises:
+            ValueError: the shift is a larger one.
         """
-        self._step(self.struct_address, *shift)
+        x, y = shift
+        if not (-1 <= x <= 1 and -1 <= y <= 1):
+            raise ValueError(f"shift: expected -1, 0 or 1 cells along each axis; got {shift}")
+        self._step(self.struct_address, x, y)
 
     def moments(self, stride: int = 1) -> Picture:
         """Return the present state as means over blocks of ``stride`` × ``stride`` cells.
