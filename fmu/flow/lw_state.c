@@ -63,33 +63,50 @@ void lw_lattice_init(lw_lattice *lattice) {
     }
 }
 
-/* Mass less 1 and momentum per cell, the mean over a block. */
-static void block(const lw_lattice *lattice, int64_t at, int32_t stride, double mean[3]) {
-    double sum[3] = {0.0, 0.0, 0.0};
+/* Add mass less 1 and momentum of one cell of each of `count` blocks, which follow each other in a row. */
+static void add_up(const float *f, int64_t plane, int32_t stride, int32_t count, double (*sum)[3]) {
+    for (int32_t k = 0; k < count; ++k, f += stride) {
+        const double e = f[plane], n = f[2 * plane], w = f[3 * plane], s = f[4 * plane];
+        const double ne = f[5 * plane], nw = f[6 * plane], sw = f[7 * plane], se = f[8 * plane];
+        sum[k][0] += f[0] + (e + w) + (n + s) + (ne + sw) + (nw + se);
+        sum[k][1] += (e - w) + (ne - sw) - (nw - se);
+        sum[k][2] += (n - s) + (ne - sw) + (nw - se);
+    }
+}
+
+/* Means over `count` blocks whose first cell is at `f`. */
+static void blocks(const lw_lattice *lattice, const float *f, int32_t stride, int32_t count, double (*mean)[3]) {
+    const double share = 1.0 / ((double)stride * stride);
+    for (int32_t k = 0; k < count; ++k) {
+        mean[k][0] = mean[k][1] = mean[k][2] = 0.0;
+    }
     for (int32_t b = 0; b < stride; ++b) {
         for (int32_t a = 0; a < stride; ++a) {
-            const float *f = lattice->populations + at + (int64_t)b * lattice->nx + a;
-            const moments m = of_cell(f, lattice->plane);
-            sum[0] += m.density;
-            sum[1] += (1.0 + m.density) * m.ux;
-            sum[2] += (1.0 + m.density) * m.uy;
+            add_up(f + (int64_t)b * lattice->nx + a, lattice->plane, stride, count, mean);
         }
     }
-    for (int k = 0; k < 3; ++k) {
-        mean[k] = sum[k] / ((double)stride * stride);
+    for (int32_t k = 0; k < count; ++k) {
+        for (int c = 0; c < 3; ++c) {
+            mean[k][c] *= share;
+        }
     }
 }
 
 void lw_lattice_moments(const lw_lattice *lattice, int32_t stride, float *velocity, float *density) {
+    enum { TOGETHER = 64 };
     const int32_t columns = lattice->nx / stride, rows = lattice->ny / stride;
+    double mean[TOGETHER][3];
     for (int32_t j = 0; j < rows; ++j) {
-        for (int32_t i = 0; i < columns; ++i) {
-            const int64_t to = (int64_t)j * columns + i;
-            double mean[3];
-            block(lattice, (int64_t)j * stride * lattice->nx + (int64_t)i * stride, stride, mean);
-            density[to] = (float)mean[0];
-            velocity[to] = (float)(mean[1] / (1.0 + mean[0]));
-            velocity[to + (int64_t)rows * columns] = (float)(mean[2] / (1.0 + mean[0]));
+        for (int32_t i = 0; i < columns; i += TOGETHER) {
+            const int32_t count = columns - i < TOGETHER ? columns - i : TOGETHER;
+            const float *first = lattice->populations + (int64_t)stride * ((int64_t)j * lattice->nx + i);
+            blocks(lattice, first, stride, count, mean);
+            for (int32_t k = 0; k < count; ++k) {
+                const int64_t to = (int64_t)j * columns + i + k;
+                density[to] = (float)mean[k][0];
+                velocity[to] = (float)(mean[k][1] / (1.0 + mean[k][0]));
+                velocity[to + (int64_t)rows * columns] = (float)(mean[k][2] / (1.0 + mean[k][0]));
+            }
         }
     }
 }

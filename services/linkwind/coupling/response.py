@@ -21,7 +21,7 @@ def stiffness(plant: Plant, state: State, history: History, weight: Array) -> fl
     if history.response is None:
         return 0.0
     inertia = plant.inertia(state, None, history.response)
-    return float((np.abs(inertia[:, range(6), range(6)]) * weight).max())
+    return float((np.abs(inertia.diagonal(axis1=1, axis2=2)) * weight).max())
 
 
 def through(order: int, stiff: float) -> int:

@@ -136,7 +136,7 @@ class Boundary:
             The largest velocity through an outline, halfway between two markers [cells/step], if looked for.
         """
         self._twist[:] = twist
-        force = _at(lattice.force)
+        force = lattice.force_address
         arguments = (self._self, lattice.struct_address, force, self._twist_at)
         self._act(*arguments)
         leak = self._leak(*arguments) if look else None

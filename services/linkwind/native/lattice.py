@@ -67,7 +67,7 @@ class Lattice:
         threads: that share a step; the bits do not depend on it.
         force: on the fluid of each cell in the coming step [cells/step², times the density 1], shape
             (2, ny, nx), float32; read in ``force_rows`` only, never changed by a step.
-        struct_address: of the ``lw_lattice``, for other functions of the library.
+        struct_address, force_address: of the ``lw_lattice`` and of ``force``, for the rest of the library.
     """
 
     def __init__(
@@ -106,7 +106,8 @@ class Lattice:
         self.force = _aligned(2 * ny * nx).reshape(2, ny, nx)
         self._blend = np.zeros(nx, dtype=np.float32)
         first, second = map(_address, self._places)
-        rest = (plane, first, second, _address(self.force), _address(self._blend))
+        self.force_address = _address(self.force)
+        rest = (plane, first, second, self.force_address, _address(self._blend))
         self._struct = _Lattice(nx, ny, fringe, 0, ny, 0.0, (0.0, 0.0), *rest)
         self.shear_rate, self.stream = shear_rate, stream
         self.struct_address = ctypes.addressof(self._struct)

@@ -65,12 +65,10 @@ class Flow:
         points = markers(acted, list(scenario.joints), self._grid.cell, self._grid.lattice_viscosity)
         self._boundary = Boundary(len(acted), points)
         self._interior = Interior(acted, self._grid.density)
-        self._reach = np.array([0.5 * body.shape.reference_length for body in acted if body.shape])
+        self._reach = [0.5 * body.shape.reference_length for body in acted if body.shape]
         self._lengths = np.array([1.0, 1.0, self._grid.cell])  # of a force, a force, a torque
-        each = np.tile(self._lengths, len(acted))
-        self._squares = np.outer(each, each)
         rows = (6 * np.arange(len(acted))[:, None] + np.array([0, 1, 5])).ravel()
-        self._planar_entries = np.ix_(rows, rows)  # of G in space
+        self._planar_entries = (6 * len(acted) * rows[:, None] + rows).ravel()  # of G in space
         self._every = max(1, round(scenario.steps / provider.flow.frames)) if provider.flow.frames else 0
         self._h = scenario.coupling.step_ns / 1e9
         self._substeps = self._grid.substeps
@@ -93,7 +91,7 @@ class Flow:
         if self._fluid is None:
             self._begin(accepted)
         elif step > self._step and not self._ahead:
-            self._go(self._trial.pose, self._wall(t, accepted.twist), look=step % LOOK_EVERY == 0)
+            self._go(self._wall(t, accepted.twist), look=step % LOOK_EVERY == 0)
         self._step, self._ahead = step, False
         self._keep_slow(accepted)
         self._accepted = accepted
@@ -163,6 +161,7 @@ class Flow:
         self._accepted = accepted
         self._window.restore(blob[_MEMORY.size + 14 * n * 8 :])
         self._substeps = round(self._h / self._window.step)
+        self._measure()
 
     @property
     def fluid(self) -> Window:
@@ -182,6 +181,7 @@ class Flow:
         centres = start.pose[:, :2]
         size = grids.window(self._scenario, self._provider, self._grid, centres)
         self._fluid = Window(self._grid, size, centres.mean(axis=0), self._provider.flow.threads)
+        self._measure()
         self._set_out(start)
         self._accepted = start
         self._keep_slow(start)
@@ -208,9 +208,9 @@ class Flow:
         self._place(t, self._trial)
         wall = self._wall(t, self._trial.twist)
         self._boundary.evaluate(self._window.twists(wall))
-        scale, n = self._scale(), len(self._bodies)
-        force = self._boundary.wrench * (scale * self._lengths)
-        response = self._boundary.response * (scale / self._window.speed * self._squares)
+        n = len(self._bodies)
+        force = self._boundary.wrench * self._forces
+        response = self._boundary.response * self._responses
         if t > 0.0 and self._interior.any:
             inertia = self._interior.inertia(self._trial.pose)
             force += self._inside(t, wall, inertia)
@@ -231,15 +231,15 @@ class Flow:
             wall = self._wall(now, at.twist)
             self._boundary.evaluate(self._window.twists(wall))
             total += self._boundary.wrench
-            self._go(at.pose, wall, look=i == count)
-        force = total * (self._scale() / count * self._lengths)
+            self._go(wall, look=i == count)
+        force = total * (self._forces / count)
         if self._interior.any:
             inertia = self._interior.inertia(self._trial.pose)
             force += self._inside(t, self._wall(t, self._trial.twist), inertia)
         return force
 
-    def _go(self, pose: Array, wall: Array, *, look: bool) -> None:
-        leak = self._window.go(self._boundary, pose, wall, look=look)
+    def _go(self, wall: Array, *, look: bool) -> None:
+        leak = self._window.go(self._boundary, wall, look=look)
         self._leak = self._leak if leak is None else leak
 
     def _inside(self, t: float, wall: Array, inertia: Array) -> Array:
@@ -249,9 +249,12 @@ class Flow:
         gained = (inertia * wall[:, None, :]).sum(axis=2) - (then * before[:, None, :]).sum(axis=2)
         return np.asarray(gained / self._h)
 
-    def _scale(self) -> float:
-        """Return the force of a lattice unit [N]."""
-        return self._grid.density * self._grid.cell * self._window.speed**2
+    def _measure(self) -> None:
+        """Compute what a lattice unit of force and torque, and of the response, is [N, N·m; N·s/m …]."""
+        each = np.tile(self._lengths, len(self._bodies))
+        newton, speed = self._grid.density * self._grid.cell * self._window.speed**2, self._window.speed
+        self._forces = newton * self._lengths
+        self._responses = newton / speed * np.outer(each, each)
 
     def _keep_slow(self, at: Planar) -> None:
         """Shorten the lattice step where the bodies have become too fast for it."""
@@ -271,6 +274,7 @@ class Flow:
         except ValueError as error:
             raise self._refuse.too_fast(fastest) from error  # its viscosity is too small for a float
         self._substeps *= 2
+        self._measure()
         _log.info(
             '"%s": a body goes %.4g m/s: %d lattice steps in a communication step from now on',
             self._provider.name, fastest, self._substeps,
@@ -284,7 +288,7 @@ class Flow:
         wrench.force[:, :2], wrench.torque[:, 2] = force[:, :2], force[:, 2]
         if wrench.response is not None:
             wrench.response.fill(0.0)
-            wrench.response[self._planar_entries] = response
+            wrench.response.reshape(-1)[self._planar_entries] = response.reshape(-1)
         if wrench.diagnostics is not None:
             speed = max(self._trial.fastest(self._reach), math.hypot(*self._grid.wind))
             wrench.diagnostics[:] = (

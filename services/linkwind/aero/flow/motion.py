@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -21,10 +22,10 @@ class Planar(NamedTuple):
     pose: Array
     twist: Array
 
-    def fastest(self, reach: Array) -> float:
-        """Return the largest speed of a point up to ``reach`` [m] from the centres of mass, shape (n,)."""
+    def fastest(self, reach: Sequence[float]) -> float:
+        """Return the largest speed of a point up to ``reach`` [m] from the centres of mass, body by body."""
         fastest = 0.0
-        for (x, y, turn), far in zip(self.twist.tolist(), reach.tolist(), strict=True):
+        for (x, y, turn), far in zip(self.twist.tolist(), reach, strict=True):
             speed = math.hypot(x, y) + abs(turn) * far
             if not speed <= fastest:  # not a number stays visible
                 fastest = speed
@@ -33,15 +34,16 @@ class Planar(NamedTuple):
 
 def planar(motion: Motion, bodies: Array | slice) -> Planar:
     """Return the motion of some of the bodies in the plane; a slice of them is faster."""
-    orientation, position = motion.orientation[bodies], motion.position[bodies]
-    pose, twist = np.empty((len(position), 4)), np.empty((len(position), 3))
-    w, z = orientation[:, 0], orientation[:, 3]
-    pose[:, :2] = position[:, :2]
-    pose[:, 2] = w * w - z * z
-    pose[:, 3] = 2.0 * w * z
-    twist[:, :2] = motion.linear[bodies][:, :2]
-    twist[:, 2] = motion.angular[bodies][:, 2]
-    return Planar(pose, twist)
+    arrays = (motion.position, motion.orientation, motion.linear, motion.angular)
+    # So few numbers make a list faster than the parts of an array.
+    rows = [
+        (x, y, w * w - z * z, 2.0 * w * z, vx, vy, turn)
+        for (x, y, _), (w, _, _, z), (vx, vy, _), (_, _, turn) in zip(
+            *(array[bodies].tolist() for array in arrays), strict=True
+        )
+    ]
+    both = np.array(rows)
+    return Planar(both[:, :4], both[:, 4:])
 
 
 def between(start: Planar, end: Planar, share: float, h: float) -> Planar:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import struct
 
 import numpy as np
@@ -27,7 +26,6 @@ class Window:
     Attributes:
         lattice: the fluid, at rest at first: the stream everywhere.
         offset: cells by which the window has followed, x and y.
-        step: of the lattice [s].
     """
 
     def __init__(self, grid: Grid, size: tuple[int, int], middle: Array, threads: int) -> None:
@@ -44,10 +42,20 @@ class Window:
         self.offset = np.zeros(2, dtype=np.int64)
         self._kept: NDArray[np.float32] | None = None
         self._kept_offset = np.zeros(2, dtype=np.int64)
-        self.step = grid.step
         self._cell = grid.cell
+        self.step = grid.step
         self._stand = np.array([grid.place[0] * columns, grid.place[1] * rows])
         self._corner = middle - self._stand * grid.cell  # centre of cell (0, 0) at the start [m]
+
+    @property
+    def step(self) -> float:
+        """Time of a lattice step [s]."""
+        return self._step
+
+    @step.setter
+    def step(self, value: float) -> None:
+        self._step = value
+        self._units = np.array([1.0 / self.speed, 1.0 / self.speed, value])
 
     @property
     def speed(self) -> float:
@@ -56,24 +64,27 @@ class Window:
 
     def poses(self, pose: Array) -> Array:
         """Return poses (x, y [m], cos, sin), shape (n, 4), in cells of the window."""
-        inside = pose.copy()
-        inside[:, :2] = (pose[:, :2] - self._corner) / self._cell - self.offset
-        return inside
+        cell, (left, low), (x0, y0) = self._cell, self._corner.tolist(), self.offset.tolist()
+        inside = [((x - left) / cell - x0, (y - low) / cell - y0, c, s) for x, y, c, s in pose.tolist()]
+        return np.array(inside)
 
     def twists(self, twist: Array) -> Array:
         """Return twists (m/s, m/s, rad/s), shape (n, 3), in cells and steps."""
-        return twist * (1.0 / self.speed, 1.0 / self.speed, self.step)
+        scaled: Array = twist * self._units
+        return scaled
 
     def place(self, boundary: Boundary, pose: Array) -> tuple[int, int]:
         """Put bodies into the window; return what came of it, and the marker it is about."""
-        return boundary.place(self.lattice, self.poses(pose))
+        self._placed = self.poses(pose)
+        return boundary.place(self.lattice, self._placed)
 
-    def go(self, boundary: Boundary, pose: Array, twist: Array, *, look: bool) -> float | None:
-        """Step the fluid with bodies that are placed, and follow them; return the leak [m/s] if to look."""
-        away = (self.poses(pose)[:, :2].mean(axis=0) - self._stand).tolist()
-        x, y = (int(math.copysign(1.0, far)) if abs(far) > SLACK else 0 for far in away)
+    def go(self, boundary: Boundary, twist: Array, *, look: bool) -> float | None:
+        """Step the fluid with the bodies that are placed, and follow them; return the leak [m/s] or None."""
+        middle = np.add.reduce(self._placed)[:2] / len(self._placed)
+        x, y = ((far > SLACK) - (far < -SLACK) for far in (middle - self._stand).tolist())
         leak = boundary.step(self.lattice, self.twists(twist), (x, y), look=look)
-        self.offset += (x, y)
+        if x or y:
+            self.offset += (x, y)
         return None if leak is None else leak * self.speed
 
     def halve(self, viscosity: float) -> None:
