@@ -33,7 +33,9 @@ def test_arrays_of_another_layout_are_sent_row_by_row(frame: FlowFrame) -> None:
 
 
 def test_the_message_is_as_the_schema_says(frame: FlowFrame) -> None:
-    message = MESSAGES["FlowFrame"].FromString(frame.encode("r1", "aero", 1))
+    payload = frame.encode("r1", "aero", 1)
+    message = MESSAGES["FlowFrame"].FromString(payload)
+    assert message.SerializeToString() == payload
     rows, columns = frame.shape
     assert (message.rows, message.columns, message.step, message.time_ns) == (rows, columns, 100, 100_000_000)
     assert np.frombuffer(message.velocity, "<f4")[2 * columns + 1] == frame.velocity[1, 0, 1]

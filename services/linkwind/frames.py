@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from linkwind.errors import ProtocolError
 from linkwind.schema import MESSAGES
+from linkwind.wire import preamble
 
 Single = NDArray[np.float32]
 
@@ -69,19 +70,20 @@ class FlowFrame:
             ProtocolError: an array has another shape than the pressure.
         """
         rows, columns = self.shape
-        arrays: dict[str, bytes] = {}
+        message = MESSAGES["FlowFrame"](
+            run=run, provider=provider, number=number, step=self.step, time_ns=self.time_ns,
+            rows=rows, columns=columns, cell=self.cell, origin_x=self.origin[0], origin_y=self.origin[1],
+        )  # fmt: skip
+        parts = [message.SerializeToString()]
         for name, inner in COMPONENTS.items():
             array = getattr(self, name)
             if array.shape != (rows, columns, *inner):
                 expected = (rows, columns, *inner)
                 raise ProtocolError(f'"{provider}": frame: {name}: expected {expected}; got {array.shape}')
-            arrays[name] = np.ascontiguousarray(array, SINGLE).tobytes()
-        message = MESSAGES["FlowFrame"](
-            run=run, provider=provider, number=number, step=self.step, time_ns=self.time_ns,
-            rows=rows, columns=columns, cell=self.cell, origin_x=self.origin[0], origin_y=self.origin[1],
-            **arrays,
-        )  # fmt: skip
-        return bytes(message.SerializeToString())
+            field = message.DESCRIPTOR.fields_by_name[name]
+            data = np.ascontiguousarray(array, SINGLE).tobytes()
+            parts += [preamble(field.number, len(data)), data]
+        return b"".join(parts)
 
 
 def decode(payload: bytes, run: str, provider: str) -> tuple[int, FlowFrame]:

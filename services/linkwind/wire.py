@@ -65,6 +65,20 @@ def _varint(data: bytes, at: int) -> tuple[int, int]:
         shift += 7
 
 
+def preamble(number: int, size: int) -> bytes:
+    """Return what goes before the ``size`` bytes of field ``number``: tag and length.
+
+    Large ones are joined to a message by hand: protobuf copies them several times over.
+    """
+    out = bytearray()
+    for value in (number << 3 | DELIMITED, size):
+        while value > 0x7F:
+            out.append(value & 0x7F | 0x80)
+            value >>= 7
+        out.append(value)
+    return bytes(out)
+
+
 def _regions(data: bytes, at: int, end: int, descriptor: Any, prefix: str) -> Iterator[tuple[str, Region]]:
     """Yield dotted name and place of every fixed-width field of ``data[at:end]``, in wire order."""
     fields = descriptor.fields_by_number

@@ -281,7 +281,7 @@ class Flow:
         )  # fmt: skip
 
     def _write(self, t: float, force: Array, response: Array, wrench: Wrench) -> None:
-        if not np.isfinite(force).all():
+        if not all(map(math.isfinite, force.ravel().tolist())):
             raise self._refuse.unstable(t, force)
         wrench.force.fill(0.0)
         wrench.torque.fill(0.0)
