@@ -20,6 +20,7 @@ from linkwind.cli import (
     services,
     validate,
     verify,
+    view,
 )
 from linkwind.errors import LinkwindError
 
@@ -37,6 +38,7 @@ scenario.register(app)
 report.register(app)
 logs.register(app)
 verify.register(app)
+view.register(app)
 replay.register(app)
 resume.register(app)
 fmu.register(app)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from linkwind.errors import LogError
 from linkwind.log import contents
-from linkwind.log.chunks import ChannelInfo
+from linkwind.log.chunks import MAGIC, ChannelInfo
 from linkwind.log.facts import Damage
 from linkwind.log.scan import Contents
 
@@ -128,3 +128,15 @@ class Head:
     def final_state_sha256(self) -> str | None:
         """Of the last accepted state; None for a run without an end."""
         return self.ending.get("final_state_sha256")
+
+
+def check_magic(path: Path) -> None:
+    """Raise LogError unless a file can be opened and starts like an MCAP file."""
+    try:
+        with path.open("rb") as file:
+            start = file.read(len(MAGIC))
+    except OSError as error:
+        raise LogError(f"{path}: expected a log; got {error.strerror}. Check the path.") from error
+    if start != MAGIC:
+        got = f"a file that starts with {start!r}" if start else "an empty file"
+        raise LogError(f"{path}: expected an MCAP file; got {got}. Give the log.mcap of a linkwind run.")

@@ -22,9 +22,9 @@ from google.protobuf.message import DecodeError
 from linkwind.errors import LogError
 from linkwind.frames import FlowFrame
 from linkwind.log import contents, grid, tables
-from linkwind.log.chunks import MAGIC, ChannelInfo, Data, Message, chunk_records, messages_of
+from linkwind.log.chunks import ChannelInfo, Data, Message, chunk_records, messages_of
 from linkwind.log.facts import Damage, DecodedMessage, LogInfo, RawMessage
-from linkwind.log.head import Head
+from linkwind.log.head import Head, check_magic
 from linkwind.log.scan import scan
 from linkwind.schema import MESSAGES
 
@@ -185,12 +185,6 @@ def open_log(path: str | Path) -> Log:
         LogError: the file is missing, empty, not MCAP, or not a log of linkwind.
     """
     path = Path(path)
-    try:
-        with path.open("rb") as file:
-            start = file.read(len(MAGIC))
-            if start == MAGIC:
-                return Log(path, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
-    except OSError as error:
-        raise LogError(f"{path}: expected a log; got {error.strerror}. Check the path.") from error
-    got = f"a file that starts with {start!r}" if start else "an empty file"
-    raise LogError(f"{path}: expected an MCAP file; got {got}. Give the log.mcap of a linkwind run.")
+    check_magic(path)
+    with path.open("rb") as file:
+        return Log(path, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))

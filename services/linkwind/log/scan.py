@@ -92,14 +92,15 @@ def _take(data: Data, at: int, span: Span, contents: Contents) -> int:
     elif span.opcode == Opcode.MESSAGE_INDEX:
         return span.end
     else:
-        readable = _take_rare(span.opcode, data[span.start : span.end], contents)
+        readable = take_rare(span.opcode, data[span.start : span.end], contents)
     if not readable:
         name = Opcode(span.opcode).name.lower().replace("_", " ")
         contents.gaps.append(Gap(at, span.end - at, f"a {name} is damaged"))
     return span.end
 
 
-def _take_rare(opcode: int, content: bytes, contents: Contents) -> bool:
+def take_rare(opcode: int, content: bytes, contents: Contents) -> bool:
+    """Take in a header, a metadata record or an attachment; tell whether it could be read."""
     if opcode == Opcode.HEADER:
         header = parsed(Header, content)
         contents.profile = "" if header is None else header.profile
@@ -119,14 +120,22 @@ def _take_rare(opcode: int, content: bytes, contents: Contents) -> bool:
 
 def _resynchronise(data: Data, at: int, contents: Contents) -> int:
     """Note a gap from ``at`` to the next chunk with a right checksum, or to the end; return its end."""
+    found = next_chunk(data, at)
+    if found is not None:
+        contents.gaps.append(Gap(at, found - at, "records are damaged"))
+        return found
+    contents.gaps.append(Gap(at, len(data) - at, "the file is cut: its writer was stopped, or the disk full"))
+    return len(data)
+
+
+def next_chunk(data: Data, at: int) -> int | None:
+    """Return where the first chunk with a right checksum behind byte ``at`` starts; None without any."""
     found = at
     while (found := data.find(CHUNK_BYTE, found + 1)) >= 0:
         span = record_at(data, found)
         if span is not None and chunk_records(data, span) is not None:
-            contents.gaps.append(Gap(at, found - at, "records are damaged"))
             return found
-    contents.gaps.append(Gap(at, len(data) - at, "the file is cut: its writer was stopped, or the disk full"))
-    return len(data)
+    return None
 
 
 def _check_end(data: Data, at: int, span: Span, contents: Contents) -> None:

@@ -41,18 +41,13 @@ class Quantity(NamedTuple):
 def film(flow: Flow) -> dict[str, Any]:
     """Return what the animation needs: times, places and pictures of the frames, and their colours."""
     chosen = every_nth(len(flow.t), FRAMES)
-    quantities = {
-        "vorticity": Quantity(
-            "1/s", -flow.vorticity, flow.vorticity, vorticity_colours(), lambda f: f.vorticity
-        ),
-        "speed": Quantity("m/s", 0.0, flow.speed, speed_colours(), speed),
-    }
-    pictures: dict[str, list[str]] = {name: [] for name in quantities}
-    quality = _quality(flow, list(quantities.values()), len(chosen))
+    shown = quantities(flow)
+    pictures: dict[str, list[str]] = {name: [] for name in shown}
+    quality = _quality(flow, list(shown.values()), len(chosen))
     extents = []
     for frame in flow.some(chosen):
         extents.append(frame.extent)
-        for name, quantity in quantities.items():
+        for name, quantity in shown.items():
             pictures[name].append(_webp(quantity, frame, quality))
     return {
         "provider": flow.provider,
@@ -66,8 +61,17 @@ def film(flow: Flow) -> dict[str, Any]:
                 "colours": base64.b64encode(quantity.colours.tobytes()).decode("ascii"),
                 "pictures": pictures[name],
             }
-            for name, quantity in quantities.items()
+            for name, quantity in shown.items()
         },
+    }
+
+
+def quantities(flow: Flow) -> dict[str, Quantity]:
+    """Return what can be seen of a flow, by name."""
+    top, fast = flow.vorticity, flow.speed
+    return {
+        "vorticity": Quantity("1/s", -top, top, vorticity_colours(), lambda frame: frame.vorticity),
+        "speed": Quantity("m/s", 0.0, fast, speed_colours(), speed),
     }
 
 
@@ -81,7 +85,18 @@ def _quality(flow: Flow, quantities: list[Quantity], count: int) -> int:
 
 
 def _webp(quantity: Quantity, frame: FlowFrame, quality: int) -> str:
-    """Return a frame as a grey WebP in base64, the highest y at the top; what is no number is 0."""
+    return base64.b64encode(picture(quantity, frame, quality, effort=6)).decode("ascii")
+
+
+def picture(quantity: Quantity, frame: FlowFrame, quality: int, effort: int = 2) -> bytes:
+    """Return a frame as a grey WebP, the highest y at the top; what is no number is 0.
+
+    Args:
+        quantity: what of the frame.
+        frame: of the fluid.
+        quality: of the picture, 0 to 100.
+        effort: to make it small, 0 to 6.
+    """
     from PIL import Image
 
     stride = -(-max(frame.shape) // CELLS)
@@ -89,8 +104,8 @@ def _webp(quantity: Quantity, frame: FlowFrame, quality: int) -> str:
     share = np.nan_to_num((values - quantity.low) / (quantity.high - quantity.low))
     grey = np.round(np.clip(share, 0.0, 1.0) * GREY).astype(np.uint8)[::-1]
     data = io.BytesIO()
-    Image.fromarray(grey).convert("RGB").save(data, "WEBP", quality=quality, method=6)
-    return base64.b64encode(data.getvalue()).decode("ascii")
+    Image.fromarray(grey).convert("RGB").save(data, "WEBP", quality=quality, method=effort)
+    return data.getvalue()
 
 
 def vorticity_colours() -> Bytes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from html import escape
 from importlib.resources import files
 from string import Template
@@ -39,7 +40,7 @@ def render(run: Run) -> str:
         data=script_json(_data(run)),
         css=_asset("page.css"),
         plotly=get_plotlyjs(),
-        script="\n".join(map(_asset, _SCRIPTS)),
+        script="\n".join(map(_plain, _SCRIPTS)),
     )
 
 
@@ -47,6 +48,11 @@ def script_json(value: Any) -> str:
     """Return JSON that can stand in a script element, whatever text is in it."""
     text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
+
+
+def _plain(name: str) -> str:
+    """Return a module as plain script: in one file with the others it needs no imports."""
+    return re.sub(r"^import .*;$|^export ", "", _asset(name), flags=re.MULTILINE)
 
 
 def _asset(name: str) -> str:

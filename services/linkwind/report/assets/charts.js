@@ -1,14 +1,27 @@
 // The plots: one plotly figure a row, one time range and one cursor for all of them.
 
+import { indexAt, unpack } from "./clock.js";
+
 const MARGIN = { l: 62, r: 10, t: 6, b: 8 };
 const BOTTOM = 36; // of a row that carries the time axis
 
-function theme() {
+export function theme() {
   const style = getComputedStyle(document.documentElement);
   return (name) => style.getPropertyValue(`--${name}`).trim();
 }
 
-const bodyColour = (index) => `c${index % 8}`;
+export const bodyColour = (index) => `c${index % 8}`;
+
+// Which body has which colour.
+export function makeKey(bodies) {
+  document.getElementById("bodies").replaceChildren(...bodies.map((body, i) => {
+    const item = document.createElement("li");
+    item.textContent = body.name;
+    item.style.setProperty("--colour", `var(--${bodyColour(i)})`);
+    return item;
+  }));
+}
+
 const DASHES = ["solid", "dash", "dot", "dashdot"];
 
 // Numbers of one row all have the same number of decimals, so that they do not jump.
@@ -76,45 +89,54 @@ function makeRow(row, card) {
   const cursor = document.createElement("div");
   cursor.className = "cursor";
   cursor.style.height = `calc(100% - ${MARGIN.t + (row.last ? BOTTOM : MARGIN.b)}px)`;
-  const format = formatter(row);
   const values = row.bars ? [] : row.curves.map((curve) => {
     const item = readout.appendChild(document.createElement("span"));
     item.style.setProperty("--colour", `var(--${bodyColour(curve.colour)})`);
     item.append(curve.name, " ", document.createElement("b"));
     return item.lastChild;
   });
-  const show = (t) => row.curves.forEach((curve, i) => {
+  const made = { ...row, plot, cursor, format: formatter(row) };
+  made.show = (t) => made.curves.forEach((curve, i) => {
     const y = curve.y[indexAt(curve.x, t + 1e-12 * Math.abs(t))];
-    values[i].textContent = Number.isFinite(y) ? format(y) : "–";
+    values[i].textContent = Number.isFinite(y) ? made.format(y) : "–";
   });
-  return { ...row, plot, cursor, show };
+  return made;
 }
 
-function makeCharts(panels, clock, host) {
+// The rows of all panels, their curves unpacked; `series` are the times of curves without their own.
+function unpacked(panels, series) {
+  return panels.map((panel) => ({
+    ...panel,
+    rows: panel.rows.map((row, i) => ({
+      ...row,
+      last: i === panel.rows.length - 1 || row.bars,
+      curves: row.curves.map((curve) => ({
+        ...curve,
+        y: unpack(curve.y),
+        x: curve.x ? unpack(curve.x) : series,
+        ...(curve.width ? { width: unpack(curve.width) } : {}),
+      })),
+    })),
+  }));
+}
+
+// What the rows are: as long as it stays the same, new curves go into the same plots.
+const kindOf = (panels) => JSON.stringify(
+  panels.map(({ title, rows }) => [title, rows.map(({ bars, curves }) => [bars, curves.map(({ name }) => name)])]));
+
+// `zoomed` is told the range of time that is looked at.
+export function makeCharts(panels, clock, host, zoomed = () => {}) {
   const coarse = matchMedia("(pointer: coarse)").matches; // fingers scroll the page, they do not zoom plots
   const config = {
     displaylogo: false, responsive: true, staticPlot: coarse, displayModeBar: false, doubleClick: false,
   };
-  const pad = clock.last > clock.first ? 0 : 0.5;
-  const full = [clock.first - pad, clock.last + pad];
-  let range = full;
-  const rows = [];
+  let rows = [], timed = [], kind = null, range = whole();
 
-  for (const panel of panels) {
-    const card = host.appendChild(document.createElement("article"));
-    card.className = "card";
-    card.appendChild(document.createElement("h2")).textContent = panel.title;
-    if (panel.note) card.appendChild(document.createElement("p")).textContent = panel.note;
-    panel.rows.forEach((row, i) => {
-      for (const curve of row.curves) {
-        curve.y = unpack(curve.y);
-        curve.x = curve.x ? unpack(curve.x) : clock.series;
-        if (curve.width) curve.width = unpack(curve.width);
-      }
-      rows.push(makeRow({ ...row, last: i === panel.rows.length - 1 || row.bars }, card));
-    });
+  function whole() {
+    const pad = clock.last > clock.first ? 0 : 0.5;
+    return [clock.first - pad, clock.last + pad];
   }
-  const timed = rows.filter((row) => !row.bars);
+
   const spanOf = (row) => row.bars
     ? [Math.log10(row.curves[0].x[0]) - 0.1, Math.log10(row.curves[0].x.at(-1)) + 0.1] : range;
 
@@ -131,6 +153,8 @@ function makeCharts(panels, clock, host) {
     range = to;
     for (const { plot } of timed) Plotly.relayout(plot, { "xaxis.range": [...range], "yaxis.autorange": true });
     place(clock.t);
+    const [low, high] = whole();
+    zoomed(range, low === range[0] && high === range[1]);
   }
 
   function listen(row) {
@@ -145,20 +169,62 @@ function makeCharts(panels, clock, host) {
     plot.addEventListener("pointermove", (event) => {
       if (!clock.playing && event.buttons === 0 && event.pointerType === "mouse") move(event);
     }, true);
-    plot.addEventListener("dblclick", () => zoom(full), true);
+    plot.addEventListener("dblclick", () => zoom(whole()), true);
     plot.on("plotly_relayout", (change) => {
       if ("xaxis.range[0]" in change) zoom([change["xaxis.range[0]"], change["xaxis.range[1]"]]);
     });
   }
 
-  function draw() {
+  function draw(some = rows) {
     const colour = theme();
-    for (const row of rows) Plotly.react(row.plot, tracesOf(row, colour), layoutOf(row, spanOf(row), colour), config);
+    for (const row of some) {
+      row.stale = false;
+      Plotly.react(row.plot, tracesOf(row, colour), layoutOf(row, spanOf(row), colour), config);
+    }
   }
 
-  draw();
-  for (const row of timed) { row.plot.append(row.cursor); listen(row); }
+  function build(panels) {
+    for (const { plot } of rows) Plotly.purge(plot);
+    host.replaceChildren();
+    rows = panels.flatMap((panel) => {
+      const card = host.appendChild(document.createElement("article"));
+      card.className = "card";
+      card.appendChild(document.createElement("h2")).textContent = panel.title;
+      if (panel.note) card.appendChild(document.createElement("p")).textContent = panel.note;
+      return panel.rows.map((row) => makeRow(row, card));
+    });
+    timed = rows.filter((row) => !row.bars);
+    draw();
+    for (const row of timed) { row.plot.append(row.cursor); listen(row); onScreen.observe(row.plot); }
+  }
+
+  // Draws later what is not looked at now.
+  const onScreen = new IntersectionObserver((entries) => {
+    for (const { target, isIntersecting } of entries) {
+      const row = rows.find(({ plot }) => plot === target);
+      if (!row) continue;
+      row.seen = isIntersecting;
+      if (isIntersecting && row.stale) draw([row]);
+    }
+  });
+
+  function show(panels, series, to = range) {
+    const all = unpacked(panels, series), now = kindOf(panels);
+    range = to;
+    if (now !== kind) { kind = now; build(all); }
+    else {
+      all.flatMap((panel) => panel.rows).forEach((row, i) => {
+        Object.assign(rows[i], row, { format: formatter(row), stale: true });
+      });
+      draw(rows.filter((row) => row.seen));
+    }
+    place(clock.t);
+    for (const row of timed) row.show(clock.t);
+  }
+
+  show(panels, clock.series);
   clock.listen((t) => { place(t); for (const row of timed) row.show(t); });
   new ResizeObserver(() => place(clock.t)).observe(host);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => draw());
+  return { show, get range() { return range; } };
 }

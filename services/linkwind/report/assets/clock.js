@@ -1,13 +1,13 @@
 // The one time of the page: every view listens to it, every control sets it.
 
 // Arrays of the data block are base64 of little-endian numbers.
-function unpack(packed) {
+export function unpack(packed) {
   const bytes = Uint8Array.from(atob(packed.bdata), (c) => c.charCodeAt(0));
   return packed.dtype === "f8" ? new Float64Array(bytes.buffer) : new Float32Array(bytes.buffer);
 }
 
 // Largest i with times[i] <= t (times ascending).
-function indexAt(times, t) {
+export function indexAt(times, t) {
   let low = 0, high = times.length - 1;
   while (low < high) {
     const middle = (low + high + 1) >> 1;
@@ -16,7 +16,7 @@ function indexAt(times, t) {
   return low;
 }
 
-function makeClock(times) {
+export function makeClock(times) {
   const first = times[0], last = times[times.length - 1];
   const listeners = [];
   let t = first, playing = false, speed = 1, before = 0;
@@ -57,20 +57,24 @@ function makeClock(times) {
   };
 }
 
-const SPEEDS = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100];
+export const SPEEDS = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100];
 const SHOWING = 8; // s that a run should take on the screen at first
 
-function makeControls(clock) {
+export const times = (factor) => `${factor < 1 ? `1/${Math.round(1 / factor)}` : factor} ×`;
+
+// The speed at which a run of this length [s] is seen well.
+export function leisurely(duration) {
+  const off = (factor) => Math.abs(Math.log((factor * SHOWING) / duration));
+  return SPEEDS.reduce((a, b) => (off(b) < off(a) ? b : a));
+}
+
+export function makeControls(clock) {
   const [play, scrub, time, speed] = ["play", "scrub", "time", "speed"].map((id) => document.getElementById(id));
   const step = (clock.last - clock.first) / Math.max(1, clock.times.length - 1);
   const digits = Math.min(6, Math.max(2, Math.ceil(-Math.log10(step || 1))));
 
-  const wanted = (clock.last - clock.first) / SHOWING;
-  const initial = SPEEDS.reduce((a, b) => Math.abs(Math.log(b / wanted)) < Math.abs(Math.log(a / wanted)) ? b : a);
-  for (const factor of SPEEDS) {
-    const text = factor < 1 ? `1/${Math.round(1 / factor)}` : `${factor}`;
-    speed.add(new Option(`${text} ×`, factor, factor === initial, factor === initial));
-  }
+  const initial = leisurely(clock.last - clock.first);
+  for (const factor of SPEEDS) speed.add(new Option(times(factor), factor, factor === initial, factor === initial));
   clock.speed = initial;
   scrub.max = clock.times.length - 1;
 

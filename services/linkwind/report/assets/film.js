@@ -1,9 +1,12 @@
 // The flow behind the mechanism: grey pictures of its frames, coloured here, each shown until the next one.
 
+import { indexAt } from "./clock.js";
+import { number } from "./motion.js";
+
 // The picture as a canvas; `colours` has red, green, blue and opacity for each level of grey.
-async function coloured(picture, colours) {
+async function coloured(source, colours) {
   const image = new Image();
-  image.src = `data:image/webp;base64,${picture}`;
+  image.src = source;
   await image.decode();
   const canvas = document.createElement("canvas");
   canvas.width = image.naturalWidth;
@@ -19,33 +22,43 @@ async function coloured(picture, colours) {
   return canvas;
 }
 
-function makeFilm(flow, repaint) {
+// `flow` has the times, the quantities (unit, low, high, colours), and `picture(name, i)`, which promises the
+// address of a picture and its edges: left, right, bottom, top [m]. `ahead` of the one shown are loaded.
+export function makeFilm(flow, repaint, ahead = Infinity) {
   const choice = document.getElementById("flow"), scale = document.getElementById("flow-scale");
-  const times = unpack(flow.t), extents = unpack(flow.extent), canvases = {};
+  let shots = {}, palette = {}; // of the scale that counts now
 
-  function load(name) {
-    const { colours, pictures } = flow.quantities[name];
-    const bytes = Uint8Array.from(atob(colours), (c) => c.charCodeAt(0));
-    canvases[name] = new Array(pictures.length);
-    pictures.forEach(async (picture, i) => {
-      canvases[name][i] = await coloured(picture, bytes);
-      repaint();
-    });
-    const stops = Array.from({ length: 17 }, (_, i) => {
-      const [r, g, b, a] = bytes.subarray(4 * Math.round((i * 255) / 16));
-      return `rgba(${r}, ${g}, ${b}, ${(a / 255).toFixed(2)})`;
-    });
-    canvases[name].bar = `linear-gradient(to right, ${stops.join(", ")})`;
+  function load(name, i) {
+    const all = shots, row = (all[name] ??= []);
+    if (i in row || i >= flow.times.length) return;
+    const shot = (row[i] = { canvas: null, extent: null });
+    flow.picture(name, i).then(async ([source, extent]) => {
+      shot.canvas = await coloured(source, palette[name]);
+      shot.extent = extent;
+      if (all === shots) repaint();
+    }).catch(() => { delete row[i]; }); // tried again with the next picture
+  }
+
+  // The last shot at or before the i-th that is there.
+  function found(name, i) {
+    const row = shots[name] ?? [];
+    for (; i >= 0; i--) if (row[i]?.canvas) return row[i];
+    return null;
   }
 
   function show() {
     const quantity = flow.quantities[choice.value];
     scale.hidden = !quantity;
     if (quantity) {
-      if (!canvases[choice.value]) load(choice.value);
+      const bytes = (palette[choice.value] ??= Uint8Array.from(atob(quantity.colours), (c) => c.charCodeAt(0)));
+      const stops = Array.from({ length: 17 }, (_, i) => {
+        const [r, g, b, a] = bytes.subarray(4 * Math.round((i * 255) / 16));
+        return `rgba(${r}, ${g}, ${b}, ${(a / 255).toFixed(2)})`;
+      });
       const text = (value) => number(value).replace("-", "−"), bar = document.createElement("i");
-      bar.style.background = canvases[choice.value].bar;
+      bar.style.background = `linear-gradient(to right, ${stops.join(", ")})`;
       scale.replaceChildren(text(quantity.low), bar, `${text(quantity.high)} ${quantity.unit}`);
+      if (ahead === Infinity) for (let i = 0; i < flow.times.length; i++) load(choice.value, i);
     }
     repaint();
   }
@@ -58,13 +71,22 @@ function makeFilm(flow, repaint) {
   return {
     // Draws the frame at or before t; whether there is one.
     draw(pen, camera, t) {
-      const i = indexAt(times, t + 1e-9), canvas = times[i] <= t + 1e-9 ? canvases[choice.value]?.[i] : null;
-      if (!canvas) return false;
-      const [left, right, bottom, top] = extents.subarray(4 * i);
+      const name = choice.value, i = indexAt(flow.times, t + 1e-9);
+      if (!(name in palette) || !(flow.times[i] <= t + 1e-9)) return false;
+      if (ahead < Infinity) for (let k = i; k <= i + ahead; k++) load(name, k);
+      const shot = found(name, i);
+      if (!shot) return false;
+      const [left, right, bottom, top] = shot.extent;
       const [x, y] = camera.project([left, top, 0]), [x1, y1] = camera.project([right, bottom, 0]);
       pen.imageSmoothingQuality = "high";
-      pen.drawImage(canvas, x, y, x1 - x, y1 - y);
+      pen.drawImage(shot.canvas, x, y, x1 - x, y1 - y);
       return true;
+    },
+    // Goes on with more frames, which may be on another scale.
+    update(more) {
+      if (JSON.stringify(more.quantities) !== JSON.stringify(flow.quantities)) { shots = {}; palette = {}; }
+      flow = more;
+      show();
     },
   };
 }

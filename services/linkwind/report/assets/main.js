@@ -1,17 +1,29 @@
 // Puts the page together from its data block.
+
+import { makeCharts, makeKey } from "./charts.js";
+import { makeClock, makeControls, unpack } from "./clock.js";
+import { makeFilm } from "./film.js";
+import { makeMotion } from "./motion.js";
+import { makeScene } from "./scene.js";
+
+// The frames of the data block as the film takes them.
+function flowOf({ t, extent, quantities }) {
+  const extents = unpack(extent);
+  const picture = async (name, i) => [
+    `data:image/webp;base64,${quantities[name].pictures[i]}`, extents.subarray(4 * i, 4 * i + 4),
+  ];
+  return { times: unpack(t), quantities, picture };
+}
+
 const data = JSON.parse(document.getElementById("data").textContent);
 if (data.scene === null) {
   document.body.classList.add("empty");
 } else {
   const clock = makeClock(unpack(data.scene.t));
   clock.series = unpack(data.t);
-  const bodies = document.getElementById("bodies");
-  data.scene.bodies.forEach((body, i) => {
-    const item = bodies.appendChild(document.createElement("li"));
-    item.textContent = body.name;
-    item.style.setProperty("--colour", `var(--${bodyColour(i)})`);
-  });
+  makeKey(data.scene.bodies);
   makeControls(clock);
-  makeScene(document.getElementById("scene"), data.scene, clock, data.flow);
+  const scene = makeScene(document.getElementById("scene"), makeMotion(data.scene, clock.times), clock);
+  if (data.flow) scene.film = makeFilm(flowOf(data.flow), scene.draw);
   makeCharts(data.panels, clock, document.getElementById("charts"));
 }

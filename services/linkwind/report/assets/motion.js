@@ -1,25 +1,27 @@
 // Where the bodies are at any time, and how that is seen: poses, camera, extents.
 
-const add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+import { indexAt, unpack } from "./clock.js";
+
+export const add = (a, b) => [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
 const mix = (a, b, f) => a + (b - a) * f;
-const length = (a) => Math.hypot(...a);
+export const length = (a) => Math.hypot(...a);
 
 // The vector v turned by the unit quaternion (w, x, y, z).
-function turned([w, x, y, z], v) {
+export function turned([w, x, y, z], v) {
   const a = 2 * (y * v[2] - z * v[1]), b = 2 * (z * v[0] - x * v[2]), c = 2 * (x * v[1] - y * v[0]);
   return [v[0] + w * a + y * c - z * b, v[1] + w * b + z * a - x * c, v[2] + w * c + x * b - y * a];
 }
 
 // The largest 1, 2 or 5 times a power of ten that is not above the value.
-function nice(value) {
+export function nice(value) {
   const power = 10 ** Math.floor(Math.log10(value));
   return power * [5, 2, 1].find((digit) => digit * power <= value * (1 + 1e-9));
 }
 
-const number = (value) => String(Number(value.toPrecision(3)));
+export const number = (value) => String(Number(value.toPrecision(3)));
 
 // Poses and forces at any time, from the frames: linear between two of them.
-function makeMotion(scene, times) {
+export function makeMotion(scene, times) {
   const position = unpack(scene.position), orientation = unpack(scene.orientation), force = unpack(scene.force);
   const n = scene.bodies.length, all = times.length;
   const total = scene.bodies.reduce((sum, body) => sum + body.mass, 0);
@@ -47,11 +49,16 @@ function makeMotion(scene, times) {
     const size = Math.hypot(force[i], force[i + 1], force[i + 2]);
     if (size > largest && isFinite(size)) largest = size;
   }
-  return { poses, centre, largest };
+  let world = null;
+  return {
+    scene, times, poses, centre, largest,
+    path: Array.from(times, (t) => centre(poses(t))),
+    get world() { return (world ??= extents(scene, poses, centre, times)); },
+  };
 }
 
 // Turns and scales W to the screen. `angle` and `tilt` are the orbit of a 3-D scene.
-function makeCamera(scene) {
+export function makeCamera(scene) {
   const camera = { angle: scene.planar ? 0 : -0.6, tilt: scene.planar ? 0 : 0.35, centre: [0, 0, 0], scale: 1, w: 1, h: 1 };
   camera.turn = (p) => { // right, up, towards the viewer
     const [x, y, z] = scene.up === "z" ? [p[0], p[2], -p[1]] : p;
@@ -67,12 +74,12 @@ function makeCamera(scene) {
 }
 
 // How far the run reaches (a box in W), and the mechanism from its own centre of mass.
-function extents(scene, motion, times) {
+function extents(scene, poses, centre, times) {
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
   let reach = 0;
   const stride = Math.max(1, Math.floor(times.length / 400));
   for (let i = 0; i < times.length; i += stride) {
-    const now = motion.poses(times[i]), middle = motion.centre(now);
+    const now = poses(times[i]), middle = centre(now);
     now.forEach((pose, b) => {
       const at = length(pose.at.map((x, k) => x - middle[k])) + scene.bodies[b].reach;
       if (!isFinite(at)) return;

@@ -1,5 +1,8 @@
 // The moving mechanism on a canvas: orthographic, straight on for planar motion, orbited by drag in 3-D.
 
+import { bodyColour, theme } from "./charts.js";
+import { add, length, makeCamera, nice, number, turned } from "./motion.js";
+
 const GHOSTS = 8; // earlier poses left standing over a whole run
 
 function arrow(pen, from, to, head) {
@@ -17,19 +20,17 @@ function arrow(pen, from, to, head) {
   pen.fill();
 }
 
-function makeScene(canvas, scene, clock, flow) {
+// `motion` has the scene and where everything is; `film`, the flow behind it, may come later.
+export function makeScene(canvas, motion, clock) {
   const pen = canvas.getContext("2d"), follow = document.getElementById("follow");
-  const { times } = clock, motion = makeMotion(scene, times), camera = makeCamera(scene);
-  const world = extents(scene, motion, times);
-  const size = world.high.map((x, k) => x - world.low[k]);
-  follow.checked = length(size) > 14 * world.reach;
-  const film = flow ? makeFilm(flow, () => draw()) : null;
-  const path = times.map ? Array.from(times, (t) => motion.centre(motion.poses(t))) : [];
+  const { scene } = motion, camera = makeCamera(scene);
+  const extent = () => motion.world.high.map((x, k) => x - motion.world.low[k]);
+  follow.checked = length(extent()) > 14 * motion.world.reach;
   const windSpeed = length(scene.wind);
-  let colour = theme();
+  let colour = theme(), film = null;
 
   function aim(now) {
-    const room = Math.min(camera.w, camera.h);
+    const room = Math.min(camera.w, camera.h), { world } = motion, size = extent();
     const middle = world.low.map((x, k) => x + size[k] / 2);
     if (follow.checked) {
       camera.centre = motion.centre(now);
@@ -84,7 +85,7 @@ function makeScene(canvas, scene, clock, flow) {
   function trail(t) {
     for (const [alpha, until] of [[0.3, Infinity], [0.9, t]]) {
       pen.beginPath();
-      path.forEach((p, i) => { if (times[i] <= until) pen.lineTo(...camera.project(p).slice(0, 2)); });
+      motion.path.forEach((p, i) => { if (motion.times[i] <= until) pen.lineTo(...camera.project(p).slice(0, 2)); });
       pen.globalAlpha = alpha;
       pen.strokeStyle = colour("soft");
       pen.lineWidth = 1.3;
@@ -234,4 +235,5 @@ function makeScene(canvas, scene, clock, flow) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { colour = theme(); draw(); });
   resize();
   clock.listen(draw);
+  return { draw, set film(made) { film = made; } };
 }

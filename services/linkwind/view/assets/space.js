@@ -1,0 +1,168 @@
+// A mechanism in space: solids, joints, forces and the way of the centre of mass, orbited with the mouse.
+
+import { bodyColour, theme } from "/report/charts.js";
+import { add, length, nice, number, turned } from "/report/motion.js";
+
+const SIDES = 10; // of the head of an arrow
+const FRAME = 30; // ms between two pictures at least
+
+// Triangles over closed lines of a body: caps, and sides between the two faces of an outline.
+function facesOf(body) {
+  const points = [], triangles = [];
+  const loops = body.lines.filter(({ closed, points }) => closed && points.length > 2).map(({ points: line }) => {
+    const start = points.length;
+    points.push(...line);
+    const middle = points.push([0, 1, 2].map((k) => line.reduce((sum, p) => sum + p[k], 0) / line.length)) - 1;
+    line.forEach((_, i) => triangles.push([start + i, start + (i + 1) % line.length, middle]));
+    return { start, n: line.length };
+  });
+  const [near, far] = loops;
+  if (loops.length === 2 && near.n === far.n) {
+    for (let i = 0; i < near.n; i++) {
+      const j = (i + 1) % near.n;
+      triangles.push([near.start + i, near.start + j, far.start + i], [far.start + i, near.start + j, far.start + j]);
+    }
+  }
+  return { points, triangles };
+}
+
+// The lines of a body as one, with gaps.
+function edgesOf(body) {
+  return body.lines.flatMap(({ points, closed }) => [...points, ...(closed ? [points[0]] : []), null]);
+}
+
+const GAP = [null, null, null];
+const columns = (points) => [0, 1, 2].map((k) => points.map((p) => (p ?? GAP)[k]));
+
+// A cone from the base to the tip of an arrow.
+function cone(tip, along, height, radius) {
+  const side = Math.abs(along[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0];
+  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+  const u = cross(along, side).map((x, _, v) => x / length(v)), v = cross(along, u);
+  const base = Array.from({ length: SIDES }, (_, i) => {
+    const a = (2 * Math.PI * i) / SIDES;
+    return [0, 1, 2].map((k) => tip[k] - height * along[k] + radius * (Math.cos(a) * u[k] + Math.sin(a) * v[k]));
+  });
+  return [tip, ...base];
+}
+
+export function makeSpace(host, motion, clock) {
+  const { scene } = motion, follow = document.getElementById("follow");
+  const bodies = scene.bodies.map((body) => ({ ...facesOf(body), edges: edgesOf(body) }));
+  const up = scene.up === "z" ? { x: 0, y: 0, z: 1 } : { x: 0, y: 1, z: 0 };
+  let colour = theme(), drawn = 0, waiting = 0, ready = false;
+
+  const place = (pose, points) => columns(points.map((p) => p && add(pose.at, turned(pose.q, p))));
+
+  // The room to look at: a cube, so that lengths are the same along every axis.
+  function room(now) {
+    const { low, high, reach } = motion.world;
+    const middle = follow.checked ? motion.centre(now) : low.map((x, k) => (x + high[k]) / 2);
+    const half = follow.checked ? 1.6 * reach : 0.55 * Math.max(...high.map((x, k) => x - low[k]), 1e-9);
+    return middle.map((x) => [x - half, x + half]);
+  }
+
+  function arrows(now, metres) {
+    const lines = [], heads = [], scale = motion.largest ? (0.35 * metres) / motion.largest : 0;
+    for (const { at, force } of now) {
+      const size = length(force) * scale;
+      if (!(size > 0.002 * metres)) { heads.push(...Array(SIDES + 1).fill(at)); continue; }
+      const along = force.map((x) => x / length(force)), tip = at.map((x, k) => x + size * along[k]);
+      const height = Math.min(0.045 * metres, 0.6 * size);
+      lines.push(at, at.map((x, k) => x + (size - 0.8 * height) * along[k]), null);
+      heads.push(...cone(tip, along, height, 0.36 * height));
+    }
+    return { lines, heads };
+  }
+
+  // What changes with time, trace by trace.
+  function frame(t) {
+    const now = motion.poses(t), ranges = room(now), metres = ranges[0][1] - ranges[0][0];
+    const { lines, heads } = arrows(now, metres);
+    const joints = scene.joints.map(({ body, point }) => add(now[body].at, turned(now[body].q, point)));
+    const path = motion.path.filter((_, i) => motion.times[i] <= t);
+    return {
+      ranges,
+      points: [
+        ...bodies.flatMap(({ points, edges }, b) => [place(now[b], points), place(now[b], edges)]),
+        columns(joints), columns(lines), columns(heads), columns(path),
+      ],
+    };
+  }
+
+  function traces(points) {
+    const [i, j, k] = [0, 1, 2].map((corner) => (faces) => faces.map((face) => face[corner]));
+    const at = ([x, y, z]) => ({ x, y, z, hoverinfo: "skip" });
+    const ring = scene.bodies.flatMap((_, b) => Array.from({ length: SIDES }, (_, s) => {
+      const tip = b * (SIDES + 1);
+      return [tip, tip + 1 + s, tip + 1 + ((s + 1) % SIDES)];
+    }));
+    const light = { ambient: 0.65, diffuse: 0.6, specular: 0.12, roughness: 0.8 };
+    const made = bodies.flatMap(({ triangles }, b) => {
+      const own = colour(bodyColour(b));
+      return [
+        { type: "mesh3d", ...at(points[2 * b]), i: i(triangles), j: j(triangles), k: k(triangles), color: own, opacity: 1, flatshading: true, lighting: light },
+        { type: "scatter3d", mode: "lines", ...at(points[2 * b + 1]), line: { color: own, width: 4 } },
+      ];
+    });
+    const [joints, lines, heads, path] = points.slice(2 * bodies.length);
+    return [
+      ...made,
+      { type: "scatter3d", mode: "markers", ...at(joints), marker: { size: 5, color: colour("card"), line: { color: colour("ink"), width: 2 } } },
+      { type: "scatter3d", mode: "lines", ...at(lines), line: { color: colour("force"), width: 6 } },
+      { type: "mesh3d", ...at(heads), i: i(ring), j: j(ring), k: k(ring), color: colour("force"), lighting: light },
+      { type: "scatter3d", mode: "lines", ...at(path), line: { color: colour("soft"), width: 2, dash: "solid" } },
+    ];
+  }
+
+  function layout(ranges) {
+    const axis = (range, title) => ({
+      range, title: { text: title }, color: colour("soft"), gridcolor: colour("line"), zerolinecolor: colour("line"),
+      backgroundcolor: colour("card"), showbackground: false, showspikes: false, nticks: 6,
+    });
+    const [x, y, z] = ranges;
+    return {
+      margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, paper_bgcolor: "rgba(0,0,0,0)",
+      font: { family: "system-ui, sans-serif", size: 12, color: colour("soft") },
+      uirevision: "kept", annotations: words(),
+      scene: {
+        aspectmode: "cube", dragmode: "orbit", xaxis: axis(x, "x [m]"), yaxis: axis(y, "y [m]"), zaxis: axis(z, "z [m]"),
+        camera: { up, eye: scene.up === "z" ? { x: 1.15, y: -1.35, z: 0.55 } : { x: 0.9, y: 0.6, z: 1.45 } },
+      },
+    };
+  }
+
+  function words() {
+    const wind = length(scene.wind), text = wind ? [`wind ${number(wind)} m/s along (${scene.wind.map(number).join(", ")})`] : [];
+    if (motion.largest) text.push(`longest arrow ${number(motion.largest)} N`);
+    return [{ text: text.join(" · "), x: 0.01, y: 0.01, xref: "paper", yref: "paper", xanchor: "left", yanchor: "bottom", showarrow: false }];
+  }
+
+  async function paint() {
+    if (!ready) return;
+    const { ranges, points } = frame(clock.t);
+    const at = (k) => points.map((each) => each[k]);
+    const [x, y, z] = ["xaxis", "yaxis", "zaxis"].map((name, k) => [`scene.${name}.range`, ranges[k]]);
+    drawn = performance.now();
+    await Plotly.update(host, { x: at(0), y: at(1), z: at(2) }, { ...Object.fromEntries([x, y, z]), annotations: words() });
+  }
+
+  // As often as time changes, but not faster than a picture takes.
+  function draw() {
+    if (waiting) return;
+    waiting = setTimeout(async () => { try { await paint(); } finally { waiting = 0; } }, Math.max(0, drawn + FRAME - performance.now()));
+  }
+
+  function dress() {
+    colour = theme();
+    const { ranges, points } = frame(clock.t);
+    const config = { displayModeBar: false, responsive: true, scrollZoom: true };
+    Plotly.react(host, traces(points), layout(ranges), config).then(() => { ready = true; });
+  }
+
+  dress();
+  clock.listen(draw);
+  follow.addEventListener("change", draw);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", dress);
+  return { draw };
+}

@@ -1,0 +1,157 @@
+"""A log in the browser: played, stepped, searched, its flow and its space."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from linkwind.log.reader import open_log
+
+from .pages import BADGE, PLAY, SCENE, T, scrub, served, show, troubles
+
+
+@pytest.fixture(scope="module")
+def address(logs):
+    with served(logs["planar"]) as url:
+        yield url
+
+
+@pytest.fixture
+def page(browser, address):
+    """The planar log at its start, paused."""
+    if browser.evaluate("location.href") != address:
+        show(browser, address)
+    browser.evaluate("document.activeElement.blur()")
+    browser.key("Home")
+    assert browser.evaluate(T) == 0.0
+    return browser
+
+
+def test_a_log_is_shown_without_any_other_host(browser, address):
+    show(browser, address)
+    assert browser.evaluate(BADGE) == "complete"
+    assert browser.evaluate("document.getElementById('name').textContent") == "two_link"
+    titles = browser.evaluate("[...document.querySelectorAll('h2')].map(h => h.textContent)")
+    assert titles[:2] == ["Velocity", "Aerodynamic force"]
+    assert troubles(browser) == []
+
+
+def test_keys_step_and_go_to_the_ends(page):
+    expected = [(".", 0.001), (".", 0.002), (",", 0.001), ("ArrowRight", 0.002), ("End", 0.3), (",", 0.299)]
+    for key, t in expected:
+        page.key(key, key if len(key) == 1 else "")
+        assert page.until(f"{T} === {t}"), key
+    page.key("Home")
+    assert page.evaluate(T) == 0.0
+
+
+def test_time_moves_picture_cursor_and_readouts(page):
+    cursor = "new DOMMatrix(getComputedStyle(document.querySelector('.cursor')).transform).e"
+    before = page.evaluate(f"[{SCENE}, {cursor}]")
+    scrub(page, 0.15)
+    after = page.evaluate(f"[{SCENE}, {cursor}]")
+    assert after[0] != before[0]
+    assert after[1] > before[1] + 50
+
+
+def test_the_readout_is_the_value_in_the_log(page, logs):
+    scrub(page, 0.123)
+    shown = page.evaluate("document.querySelector('.readout b').textContent").replace("−", "-")
+    assert float(shown) == pytest.approx(open_log(logs["planar"]).trajectory().linear[123, 0, 0], abs=0.006)
+
+
+def test_play_pause_and_the_end(page):
+    page.key(" ", " ")
+    page.until(f"{T} > 0.01")
+    assert page.evaluate(PLAY) == "Pause"
+    page.key(" ", " ")
+    stopped = page.evaluate(T)
+    assert page.evaluate(PLAY) == "Play"
+    page.until("true")
+    assert page.evaluate(T) == stopped
+    page.evaluate("speed.value = '5'; speed.dispatchEvent(new Event('change'))")
+    page.evaluate("document.getElementById('play').click()")
+    page.until(f"{T} === 0.3 && {PLAY} === 'Play'")
+
+
+def test_frames_of_the_flow_are_behind_the_mechanism(browser, logs):
+    with served(logs["flow"]) as url:
+        show(browser, url)
+        scrub(browser, 0.03)
+        browser.until("flow.options.length === 3")
+        browser.evaluate("flow.value = 'off'; flow.dispatchEvent(new Event('change'))")
+        bare = browser.evaluate(SCENE)
+        for quantity, unit in (("vorticity", "1/s"), ("speed", "m/s")):
+            browser.evaluate(f"flow.value = '{quantity}'; flow.dispatchEvent(new Event('change'))")
+            browser.until(f"{SCENE} !== '{bare}'")
+            assert browser.evaluate("document.getElementById('flow-scale').textContent").endswith(unit)
+        assert troubles(browser) == []
+
+
+def test_a_mechanism_in_space_is_orbited(browser, logs):
+    with served(logs["space"]) as url:
+        show(browser, url)
+        camera = "JSON.stringify(space._fullLayout.scene._scene.getCamera().eye)"
+        before = browser.until(f"document.querySelector('#space canvas') && {camera}")
+        points = "space.data[0].x.join()"
+        at_first = browser.evaluate(points)
+        scrub(browser, 0.1)
+        browser.until(f"{points} !== '{at_first}'")
+        browser.mouse("mouseMoved", 400, 400)
+        browser.mouse("mousePressed", 400, 400, 1)
+        browser.mouse("mouseMoved", 500, 430, 1)
+        browser.mouse("mouseReleased", 500, 430)
+        browser.until(f"{camera} !== '{before}'")
+        assert troubles(browser) == []
+
+
+def test_a_cut_log_is_shown_as_far_as_it_goes(browser, logs):
+    with served(logs["cut"]) as url:
+        show(browser, url)
+        assert browser.evaluate(BADGE) == "no end yet"
+        browser.key("End")
+        last = open_log(logs["cut"]).trajectory().t[-1]
+        browser.until(f"Math.abs({T} - {last}) < 1e-9")
+
+
+def test_a_phone_needs_no_sideways_scrolling(page):
+    size = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
+    page.send("Emulation.setDeviceMetricsOverride", **size)
+    try:
+        page.until("document.querySelector('.plot').clientWidth < 380")
+        assert page.evaluate("document.documentElement.scrollWidth") == 390
+        bar = page.evaluate("document.querySelector('.bar').getBoundingClientRect().bottom")
+        assert bar <= 844
+    finally:
+        size |= {"width": 1400, "height": 900, "mobile": False}
+        page.send("Emulation.setDeviceMetricsOverride", **size)
+
+
+def test_what_is_no_log_ends_with_a_clear_error(tmp_path):
+    for name, content, text in (
+        ("no.mcap", None, "expected a log; got No such file"),
+        ("text.mcap", b"hello", "expected an MCAP file"),
+    ):
+        path = tmp_path / name
+        if content is not None:
+            path.write_bytes(content)
+        done = subprocess.run(
+            [sys.executable, "-m", "linkwind", "view", str(path), "--no-open"], capture_output=True, text=True
+        )
+        assert done.returncode == 3
+        assert text in done.stderr
+
+
+def test_requests_for_another_host_are_refused(address):
+    import http.client
+
+    host, port = address.split("/")[2].split(":")
+    for name, status in (("127.0.0.1", 200), ("evil.example", 400)):
+        connection = http.client.HTTPConnection(host, int(port))
+        connection.request("GET", "/facts", headers={"Host": name})
+        answer = connection.getresponse()
+        assert answer.status == status
+        if status == 200:
+            assert json.loads(answer.read())["name"] == "two_link"
+        connection.close()
