@@ -12,6 +12,7 @@ typedef struct {
     int32_t kept;    /* bits: x, y, z, turns about x, y, z; or the distance */
     int32_t link[2]; /* -1 = world */
     int32_t row, rows;
+    int32_t item;    /* the body that it carries, or the closure that it is */
     int32_t carries; /* it is the joint of link[1] in the tree */
     lw_vec3 point[2];
     lw_mat3 rotation[2];

@@ -112,6 +112,8 @@ static lw_count count(const lw_multibody *tree) {
         found.constraints += rows > 0;
         found.rows += (size_t)rows;
     }
+    found.constraints += (size_t)tree->closures;
+    found.rows += (size_t)tree->rows;
     return found;
 }
 
@@ -146,7 +148,8 @@ static void lay_out(lw_maximal *m, lw_count c) {
     m->touch = m->touching + n + 1;
 }
 
-/* From the leaves to the roots: the factor of a chain then has no more elements than its matrix. */
+/* From the leaves to the roots: the factor of a chain then has no more elements than its matrix. What closes
+ * loops comes last. */
 static void set_constraints(lw_maximal *m) {
     lw_constraint *c = m->constraint;
     int32_t row = 0;
@@ -154,10 +157,17 @@ static void set_constraints(lw_maximal *m) {
         const lw_link *l = &m->tree->link[i];
         int32_t kept = lw_constraint_kept(l->type), rows = lw_constraint_count(kept);
         if (!rows) continue;
-        lw_constraint own = {kept, {l->parent, i}, row, rows, 1, {l->parent_point, l->child_point},
+        lw_constraint own = {kept, {l->parent, i}, row, rows, l->body, 1, {l->parent_point, l->child_point},
                              {l->parent_matrix, l->child_matrix}, 0.0};
         *c++ = own;
         row += rows;
+    }
+    for (int32_t i = 0; i < m->tree->closures; ++i) {
+        const lw_closure *l = &m->tree->closure[i];
+        lw_constraint own = {l->kept, {l->link[0], l->link[1]}, row, l->rows, i, 0, {l->point[0], l->point[1]},
+                             {l->rotation[0], l->rotation[1]}, l->length};
+        *c++ = own;
+        row += l->rows;
     }
 }
 
@@ -185,6 +195,7 @@ void lw_maximal_attach(void *memory, lw_multibody *bodies, lw_multibody *tree, i
     m->n = tree->n;
     m->constraints = (int32_t)c.constraints;
     m->rows = (int32_t)c.rows;
+    m->redundant = tree->closures > 0;
     m->stabilisation = stabilisation;
     m->time = time;
     lay_out(m, c);
@@ -199,6 +210,21 @@ void lw_maximal_attach(void *memory, lw_multibody *bodies, lw_multibody *tree, i
         bodies->link[i].articulated = no_inertia;
     }
     bodies->formulation = &m->formulation;
+}
+
+void lw_maximal_closure_reactions(const lw_multibody *bodies, double *reaction) {
+    const lw_maximal *m = (const lw_maximal *)bodies->formulation;
+    for (int32_t i = 0; i < m->constraints; ++i) {
+        const lw_constraint *c = &m->constraint[i];
+        if (c->carries) continue;
+        lw_spatial f = none;
+        for (int32_t r = c->row; r < c->row + c->rows; ++r)
+            f = lw_spatial_axpy(m->multiplier[r], m->row[r].on[1], f);
+        lw_vec3 arm = c->point[1];
+        if (c->link[1] >= 0) arm = lw_mat_vec(bodies->link[c->link[1]].rotation, arm);
+        lw_store3(reaction + 6 * c->item, f.linear);
+        lw_store3(reaction + 6 * c->item + 3, lw_sub(f.angular, lw_cross(arm, f.linear)));
+    }
 }
 
 /* ---- between the coordinates of the tree and those of the bodies ---- */

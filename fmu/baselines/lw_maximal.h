@@ -20,6 +20,10 @@ LW_API size_t lw_maximal_size(const lw_multibody *tree);
 LW_API void lw_maximal_attach(void *memory, lw_multibody *bodies, lw_multibody *tree, int32_t stabilisation,
                               double time);
 
+/* Force and torque (closures,6) of what closes loops, after the last evaluation: of the first on the second body
+ * at the point on the second. */
+LW_API void lw_maximal_closure_reactions(const lw_multibody *bodies, double *reaction);
+
 /* The state of the bodies (nq + nv + 1) that a state of the tree means. */
 LW_API void lw_maximal_start(lw_multibody *bodies, const double *tree_state, double *state);
 

@@ -46,7 +46,7 @@ static double violation(lw_maximal *m, const lw_multibody *mb, int of_rate, int3
         const lw_constraint *c = &m->constraint[i];
         for (int32_t r = c->row; r < c->row + c->rows; ++r) {
             m->right[r] = -(of_rate ? m->row[r].rate : m->row[r].value);
-            if (!(fabs(m->right[r]) <= largest)) largest = fabs(m->right[r]), *worst = c->link[c->link[1] < 0 ? 0 : 1];
+            if (!(fabs(m->right[r]) <= largest)) largest = fabs(m->right[r]), *worst = i;
         }
     }
     return largest / (closed * size);
@@ -77,8 +77,8 @@ static int undo(lw_maximal *m, lw_multibody *mb, double *q, double *v, int of_ra
         int status = prepare(m, mb, q, v, fault);
         if (status) return status;
     }
-    fault->item = mb->link[worst].body;
-    return LW_JOINT_OPEN;
+    fault->item = m->constraint[worst].item;
+    return m->constraint[worst].carries ? LW_JOINT_OPEN : LW_OPEN;
 }
 
 static int project(lw_maximal *m, lw_multibody *mb, double *q, double *v, lw_fault *fault) {

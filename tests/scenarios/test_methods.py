@@ -12,7 +12,8 @@ from linkwind.fmi.part import dynamics_part
 from linkwind.log.reader import open_log
 from linkwind.runs.run import run
 from linkwind.runs.verify import scenario_of, verify
-from linkwind.scenario import load
+from linkwind.scenario import from_json, load
+from tests.mechanism.test_loops import four_bar
 
 
 def fly(folder: Path, method: str, *settings: str):
@@ -37,6 +38,20 @@ def test_same_flight_in_the_log(tmp_path: Path, method: str, settings: list[str]
     motion = "position", "linear", "angular", "q", "v", "acceleration", "reaction", "wrench"
     for name in (*motion, "kinetic_energy", "potential_energy", "external_work"):
         np.testing.assert_allclose(getattr(one, name), getattr(other, name), atol=size, err_msg=name)
+
+
+def test_a_loop_in_the_log(tmp_path: Path):
+    """A four-bar linkage; forces of all its joints, the one that closes the loop too."""
+    text, paths = four_bar().to_json(), []
+    for method in ("reduced", "cfe"):
+        settings = ["time.end=0.1", "bus.transport=inprocess", f"dynamics.method={method}"]
+        outcome = run(from_json(text, overrides=settings), tmp_path / method, lambda step: None)
+        paths.append(open_log(outcome.log).trajectory())
+        assert outcome.result.joint_gap_max_m < 1e-13
+    for name in ("position", "linear", "q", "v", "acceleration", "reaction", "closure_reaction"):
+        one, other = (getattr(path, name) for path in paths)
+        np.testing.assert_allclose(one, other, atol=1e-8, err_msg=name)
+    assert np.abs(paths[0].closure_reaction).max() > 1.0
 
 
 def test_verify_makes_it_again_bit_for_bit(tmp_path: Path):

@@ -21,19 +21,14 @@ def multibody(mechanism: Mechanism, scenario: Scenario) -> Multibody:
     Raises:
         MechanismError: the method cannot do this mechanism.
     """
-    dynamics = scenario.dynamics
-    if mechanism.closures and dynamics.method != "reduced":
-        raise MechanismError(
-            f"{scenario.source}: dynamics.method: expected reduced, because {mechanism.closures[0]} closes a "
-            f"loop; got {dynamics.method}. Use reduced."
-        )
+    dynamics, parts = scenario.dynamics, (mechanism.tables, mechanism.bodies, mechanism.closures)
     try:
         if dynamics.method == "cfe":
             stabilisation = Stabilisation[dynamics.stabilisation.upper()]
             time = dynamics.stabilisation_time
-            return Cfe(mechanism.tables, mechanism.bodies, stabilisation=stabilisation, time=time)
+            return Cfe(*parts, stabilisation=stabilisation, time=time)
         if dynamics.method == "incremental":
-            return Incremental(mechanism.tables, mechanism.bodies)
+            return Incremental(*parts)
     except MechanismError as error:
         raise MechanismError(f"{scenario.source}: dynamics.method: {error}") from error
-    return Multibody(mechanism.tables, mechanism.bodies, mechanism.closures)
+    return Multibody(*parts)

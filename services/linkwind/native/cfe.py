@@ -13,13 +13,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from linkwind.native.library import declare
-from linkwind.native.multibody import JOINT_TYPES, Multibody, Tables
+from linkwind.native.multibody import JOINT_TYPES, Evaluation, Multibody, Tables
 from linkwind.spatial import Array, Motion, address
 
 _pointer = ctypes.c_void_p
 _size = declare("lw_maximal_size", [_pointer], ctypes.c_size_t)
 _attach = declare("lw_maximal_attach", [_pointer] * 3 + [ctypes.c_int32, ctypes.c_double], None)
 _start = declare("lw_maximal_start", [_pointer] * 3, None)
+_closure_reactions = declare("lw_maximal_closure_reactions", [_pointer] * 2, None)
 _coordinates = declare("lw_maximal_coordinates", [_pointer] * 4, None)
 _TURNING = (JOINT_TYPES["revolute"], JOINT_TYPES["planar"])
 
@@ -41,21 +42,29 @@ class Cfe(Multibody):
     """
 
     def __init__(
-        self, tables: Tables, bodies: Sequence[str] = (), *, stabilisation: Stabilisation, time: float
+        self,
+        tables: Tables,
+        bodies: Sequence[str] = (),
+        closures: Sequence[str] = (),
+        *,
+        stabilisation: Stabilisation,
+        time: float,
     ) -> None:
         """Build the mechanism.
 
         Args:
             tables: the mechanism, as for ``Multibody``; every body needs mass and inertia, or added inertia.
             bodies: names of the bodies, for errors; their numbers if not given.
+            closures: likewise of the joints that close loops.
             stabilisation: of the joints.
             time: in which Baumgarte's method undoes what a joint is open [s]: it goes back as exp(-t/time).
 
         Raises:
             MechanismError: a table has a wrong shape or a wrong value.
         """
-        self.tree = Multibody(tables, bodies)
-        super().__init__(_free(tables), bodies)
+        self.tree = Multibody(tables, bodies, closures)
+        super().__init__(_free(tables))
+        self._names = self.tree._names
         self._joints = np.zeros((_size(self.tree._model) + 7) // 8)
         _attach(address(self._joints), self._model, self.tree._model, stabilisation, time)
 
@@ -72,6 +81,13 @@ class Cfe(Multibody):
         self._take(state)
         _coordinates(self._model, self._state_at, address(q), address(v))
         return q, v
+
+    def evaluate(self, state: Array, wrench: Array, added_inertia: Array | None = None) -> Evaluation:
+        """Return accelerations and forces, see ``Multibody``; joint accelerations are the bodies' own."""
+        result = super().evaluate(state, wrench, added_inertia)
+        reaction = np.zeros((self.tree.closures, 6))
+        _closure_reactions(self._model, address(reaction))
+        return result._replace(closure_reaction=reaction)
 
     def joint_gap(self, motion: Motion) -> float:
         """Return the largest distance [m] by which given poses violate a joint; see ``Multibody``."""

@@ -26,18 +26,24 @@ class Incremental(Multibody):
     integrators ``EULER`` and ``SEMI_IMPLICIT_EULER`` make of these accelerations.
     """
 
-    def __init__(self, tables: Tables, bodies: Sequence[str] = ()) -> None:
+    def __init__(self, tables: Tables, bodies: Sequence[str] = (), closures: Sequence[str] = ()) -> None:
         """Build the mechanism.
 
         Args:
             tables: the mechanism, as for ``Multibody``.
             bodies: names of the bodies, for errors; their numbers if not given.
+            closures: likewise of the joints that close loops.
 
         Raises:
             MechanismError: a table has a wrong shape or a wrong value, or a joint that the paper does not
                 have.
         """
-        super().__init__(tables, bodies)
+        super().__init__(tables, bodies, closures)
+        if self.closures:
+            raise MechanismError(
+                f"joint {self._names[1][0]}: expected no loop, which the method incremental does not have; "
+                "got one that this joint closes. Use reduced or cfe."
+            )
         self._equations = np.zeros((_size(self._model) + 7) // 8)
         body = _attach(address(self._equations), self._model)
         if body >= 0:
