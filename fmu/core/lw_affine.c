@@ -29,6 +29,7 @@ static lw_work lay_out(double *memory, int n) {
 }
 
 static void twists(lw_multibody *mb, const double *state, double *twist) {
+    lw_modes(mb, state + mb->nq + mb->nv + 1);
     lw_kinematics(mb, state, state + mb->nq);
     for (int i = 0; i < mb->n; ++i) {
         const lw_link *l = &mb->link[i];
@@ -85,6 +86,7 @@ static void copy_inertia(const lw_multibody *mb, const double *added, double *in
 
 void lw_affine_inertia(lw_multibody *mb, const double *state, const double *added_inertia,
                        const double *response, double h, double *inertia) {
+    lw_modes(mb, state + mb->nq + mb->nv + 1);
     lw_kinematics(mb, state, state + mb->nq);
     copy_inertia(mb, added_inertia, inertia);
     add_own_inertia(mb, response, h, inertia);
@@ -106,6 +108,7 @@ static void split(const lw_work *w, const double *response, int own_apart) {
 static int compliance(lw_multibody *mb, const lw_macro_step *step, const double *inertia, lw_work *w) {
     int m = w->m;
     const double *q = step->state, *v = q + mb->nq;
+    lw_modes(mb, v + mb->nv + 1);
     lw_bind_added(mb, inertia);
     for (int column = -1; column < m; ++column) { /* the first: without any wrench */
         if (column >= 0) w->unit[column] = 1.0;

@@ -128,9 +128,17 @@ static void distance(lw_row *r, const lw_side *a, const lw_side *b, double lengt
                (lw_dot(rate, rate) - r->rate * r->rate) / size;
 }
 
+static void forceless(lw_row *r) {
+    for (int side = 0; side < 2; ++side) r->on[side].linear = r->on[side].angular = zero;
+}
+
 static void equations(const lw_multibody *mb, const lw_closure *c, lw_row *r) {
     static const int turned[3][2] = {{1, 2}, {0, 2}, {0, 1}}; /* axes on a and b that stay square */
     lw_side a = locate(mb, c, 0), b = locate(mb, c, 1);
+    if (c->released) {
+        for (int32_t k = 0; k < c->rows; ++k) r[k].value = r[k].rate = r[k].drift = 0.0, forceless(&r[k]);
+        return;
+    }
     if (c->kept == LW_DISTANCE) distance(r, &a, &b, c->length);
     if (c->kept == LW_DISTANCE) return;
     for (int k = 0; k < 3; ++k)
@@ -185,8 +193,9 @@ double lw_closure_gap(const lw_multibody *mb, const lw_closure *c, const lw_unal
     lw_mat3 frame = identity, other;
     lw_vec3 a = point_at(mb, c, 0, position, orientation, &frame);
     lw_vec3 apart = lw_sub(point_at(mb, c, 1, position, orientation, &other), a);
-    if (c->kept == LW_DISTANCE) return fabs(lw_norm(apart) - c->length);
     double square = 0.0;
+    if (c->released) return 0.0;
+    if (c->kept == LW_DISTANCE) return fabs(lw_norm(apart) - c->length);
     for (int k = 0; k < 3; ++k) {
         double along = lw_dot(axis(frame, k), apart);
         if (c->kept >> k & 1) square += along * along;
@@ -195,6 +204,7 @@ double lw_closure_gap(const lw_multibody *mb, const lw_closure *c, const lw_unal
 }
 
 void lw_multibody_closures(lw_multibody *mb, const double *state, double *value, double *jacobian) {
+    lw_modes(mb, state + mb->nq + mb->nv + 1);
     lw_kinematics(mb, state, state + mb->nq);
     lw_closure_equations(mb);
     for (int32_t k = 0; k < mb->rows * mb->nv; ++k) jacobian[k] = 0.0;

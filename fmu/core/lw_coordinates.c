@@ -16,7 +16,7 @@ void lw_coordinate_rate(const lw_multibody *mb, const double *q, const double *v
             lw_store3(rate + l->q, lw_load3(v + l->v));
             quat_rate(q + l->q + 3, v + l->v + 3, rate + l->q + 3);
         } else {
-            for (int k = 0; k < l->columns; ++k) rate[l->q + k] = v[l->v + k];
+            for (int k = 0; k < l->freedoms; ++k) rate[l->q + k] = v[l->v + k];
         }
     }
 }

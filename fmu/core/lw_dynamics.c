@@ -128,11 +128,9 @@ LW_INLINE void add_to_parent(lw_link *parent, const lw_inertia6 *i, lw_spatial f
                                         lw_add(f.angular, lw_cross(r, f.linear)));
 }
 
-static int inward(lw_multibody *mb, lw_link *l, const double *q, const double *v) {
-    double joint_force[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+static int inward(lw_multibody *mb, lw_link *l, const double *joint_force) {
     lw_inertia6 inertia = l->articulated;
     lw_spatial force = l->bias_force;
-    if (l->sprung || l->damped) lw_joint_force(mb, l, q, v, joint_force);
     int status = eliminate(l, &inertia, &force, joint_force);
     if (status || l->parent < 0) return status;
     lw_link *parent = &mb->link[l->parent];
@@ -151,6 +149,7 @@ static void outward(const lw_multibody *mb, lw_link *l, lw_spatial a, double *jo
         a.angular = lw_add(a.angular, base.angular);
         a.linear = lw_add(a.linear, lw_add(base.linear, lw_cross(base.angular, l->offset)));
     }
+    for (int k = l->columns; k < l->freedoms; ++k) joint_acceleration[l->v + k] = 0.0; /* locked */
     for (int k = l->columns - 1; k >= 0; --k) {
         const lw_column *c = &l->column[k];
         double own = (c->force - power(c->u, a)) * c->inverse;
@@ -171,8 +170,11 @@ int lw_tree_accelerations(lw_multibody *mb, const double *q, const double *v, co
     lw_kinematics(mb, q, v);
     for (int i = 0; i < mb->n; ++i) start(&mb->link[i], mb->gravity, wrench + 6 * mb->link[i].body);
     for (int i = mb->n - 1; i >= 0; --i) {
-        int status = inward(mb, &mb->link[i], q, v);
-        fault->item = mb->link[i].body;
+        lw_link *l = &mb->link[i];
+        double joint_force[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+        if (l->sprung || l->damped) lw_joint_force(mb, l, q, v, joint_force);
+        int status = inward(mb, l, joint_force);
+        fault->item = l->body;
         if (status) return status;
     }
     lw_outward(mb, 1, joint_acceleration);
@@ -224,31 +226,54 @@ static void store6(double *p, lw_spatial s) {
     lw_store3(p + 3, s.angular);
 }
 
-/* Put the closures' forces among the wrenches, so that the joints of the tree are seen to transmit them. */
-static int load_closures(lw_multibody *mb, const double *state, const double *wrench, const lw_evaluation *e,
-                         lw_fault *fault) {
-    memcpy(mb->wrench, wrench, 6 * (size_t)mb->n * sizeof(double));
-    lw_closure_forces(mb, mb->wrench, e->closure_reaction);
-    return lw_tree_accelerations(mb, state, state + mb->nq, mb->wrench, e->joint_acceleration, fault);
+lw_spatial lw_joint_reaction(const lw_link *l) {
+    lw_spatial f = spatial_axpy(1.0, l->bias_force, inertia_times(&l->articulated, l->acceleration));
+    f.angular = lw_add(f.angular, lw_cross(l->arm, f.linear));
+    return f;
+}
+
+/* The closures' forces go among the wrenches, so that the joints of the tree are seen to transmit them. */
+int lw_loaded_accelerations(lw_multibody *mb, const double *q, const double *v, const double *wrench,
+                            double *joint_acceleration, double *closure_load, lw_fault *fault) {
+    int status = lw_accelerations(mb, q, v, wrench, joint_acceleration, fault);
+    if (status || !mb->rows) return status;
+    memcpy(mb->loaded, wrench, 6 * (size_t)mb->n * sizeof(double));
+    lw_closure_forces(mb, mb->loaded, closure_load);
+    return lw_tree_accelerations(mb, q, v, mb->loaded, joint_acceleration, fault);
 }
 
 int lw_multibody_evaluate(lw_multibody *mb, const double *state, const double *wrench,
                           const double *added_inertia, const lw_evaluation *e, lw_fault *fault) {
     int status = lw_inputs_check(mb, state, 1, wrench, added_inertia, fault);
     if (status) return status;
+    lw_modes(mb, state + mb->nq + mb->nv + 1);
     lw_bind_added(mb, added_inertia);
     for (int k = 0; k < mb->nv; ++k) e->joint_acceleration[k] = 0.0;
-    status = lw_accelerations(mb, state, state + mb->nq, wrench, e->joint_acceleration, fault);
-    if (!status && mb->rows) status = load_closures(mb, state, wrench, e, fault);
+    status = lw_loaded_accelerations(mb, state, state + mb->nq, wrench, e->joint_acceleration,
+                                     e->closure_reaction, fault);
     if (status) return status;
     for (int i = 0; i < mb->n; ++i) {
         const lw_link *l = &mb->link[i];
-        lw_spatial at_com = spatial_axpy(1.0, l->bias_force, inertia_times(&l->articulated, l->acceleration));
-        lw_spatial at_joint = {at_com.linear, lw_add(at_com.angular, lw_cross(l->arm, at_com.linear))};
         store6(e->acceleration + 6 * l->body, l->acceleration);
-        store6(e->reaction + 6 * l->body, at_joint);
+        store6(e->reaction + 6 * l->body, lw_joint_reaction(l));
         store6(e->total_wrench + 6 * l->body, lw_total_wrench(l, wrench));
     }
+    return LW_OK;
+}
+
+/* ---- impulses ---- */
+
+/* Joint velocities that bodies at rest get from impulses (n,6) at their COMs; after lw_kinematics without velocity. */
+int lw_impulse_response(lw_multibody *mb, const double *impulse, double *joint_velocity, lw_fault *fault) {
+    static const lw_vec3 none = {0.0, 0.0, 0.0};
+    static const double calm[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+    for (int i = 0; i < mb->n; ++i) start(&mb->link[i], none, impulse + 6 * mb->link[i].body);
+    for (int i = mb->n - 1; i >= 0; --i) {
+        int status = inward(mb, &mb->link[i], calm);
+        fault->item = mb->link[i].body;
+        if (status) return status;
+    }
+    lw_outward(mb, 0, joint_velocity);
     return LW_OK;
 }
 
@@ -256,6 +281,7 @@ int lw_multibody_repeat(lw_multibody *mb, const double *state, int32_t repeats) 
     lw_fault fault = {0, 0.0};
     int status = LW_OK;
     for (int k = 0; k < 6 * mb->n; ++k) mb->wrench[k] = 0.0;
+    lw_modes(mb, state + mb->nq + mb->nv + 1);
     lw_bind_added(mb, NULL);
     for (int32_t k = 0; k < repeats && !status; ++k)
         status = lw_accelerations(mb, state, state + mb->nq, mb->wrench, mb->trial, &fault);

@@ -2,6 +2,7 @@
 #include "lw_model.h"
 
 void lw_multibody_energy(lw_multibody *mb, const double *state, double *kinetic, double *potential) {
+    lw_modes(mb, state + mb->nq + mb->nv + 1);
     lw_kinematics(mb, state, state + mb->nq);
     *kinetic = 0.0;
     *potential = lw_spring_energy(mb, state);

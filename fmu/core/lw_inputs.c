@@ -11,7 +11,7 @@ int lw_inputs_check(const lw_multibody *mb, const double *state, int32_t count, 
                     const double *added_inertia, lw_fault *fault) {
     int row;
     fault->time = 0.0;
-    if ((row = lw_first_not_finite(state, mb->nq + mb->nv + 1)) >= 0) {
+    if ((row = lw_first_not_finite(state, mb->nq + mb->nv + 1 + mb->events)) >= 0) {
         fault->item = row;
         return LW_STATE_NOT_FINITE;
     }

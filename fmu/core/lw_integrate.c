@@ -10,6 +10,7 @@ typedef struct {
     const lw_macro_step *step;
     lw_polynomial wrench;
     double proposed; /* substep [s] that dopri5 would take next */
+    int interrupted; /* by an event */
 } lw_run;
 
 static int length(const lw_multibody *mb) { return mb->nq + mb->nv + 2; }
@@ -118,31 +119,96 @@ static int stages(lw_run *run, const lw_tableau *t, int first, double s, double 
     return LW_OK;
 }
 
-static int runge_kutta(lw_run *run, const lw_tableau *t) {
+static int runge_kutta(lw_run *run, const lw_tableau *t, double s, double width, double h) {
     lw_multibody *mb = run->mb;
-    double h = run->step->h / run->step->substeps, width = 1.0 / run->step->substeps;
-    for (int32_t k = 0; k < run->step->substeps; ++k) {
-        int status = stages(run, t, 0, k * width, width, h);
-        if (status) return status;
-        combine(mb, t->stages, t->b, h, mb->y);
-        if ((status = settle(run, mb->y, (k + 1) * width))) return status;
-    }
-    return LW_OK;
+    int status = stages(run, t, 0, s, width, h);
+    if (status) return status;
+    combine(mb, t->stages, t->b, h, mb->y);
+    return settle(run, mb->y, s + width);
 }
 
 /* ---- semi-implicit Euler: the position moves with the new velocity ---- */
 
-static int semi_implicit_euler(lw_run *run) {
+static int semi_implicit_euler(lw_run *run, double s, double width, double h) {
     lw_multibody *mb = run->mb;
+    double *y = mb->y, *rate = mb->rate[0];
+    int status = derive(run, s, y, rate);
+    if (status) return status;
+    for (int i = mb->nq; i < length(mb); ++i) y[i] += h * rate[i];
+    lw_coordinate_rate(mb, y, y + mb->nq, rate);
+    for (int i = 0; i < mb->nq; ++i) y[i] += h * rate[i];
+    return settle(run, y, s + width);
+}
+
+/* ---- one step of a method, of `h` [s] from s; `width` is h, and s is, in macro steps ---- */
+
+static int substep(lw_run *run, double s, double width, double h) {
+    switch (run->step->integrator) {
+    case LW_EULER: return runge_kutta(run, &euler, s, width, h);
+    case LW_SEMI_IMPLICIT_EULER: return semi_implicit_euler(run, s, width, h);
+    case LW_RK4: return runge_kutta(run, &rk4, s, width, h);
+    default: return runge_kutta(run, &dopri5, s, width, h);
+    }
+}
+
+/* ---- events ---- */
+
+enum { LW_BISECTIONS = 48, LW_MAX_EVENTS = 1000 }; /* in a substep */
+
+static double at(const lw_run *run, double s) { return run->step->time + s * run->step->h; }
+
+static void remember(lw_multibody *mb) { memcpy(mb->before, mb->y, (size_t)length(mb) * sizeof(double)); }
+
+static int again(lw_run *run, double s, double width) {
+    memcpy(run->mb->y, run->mb->before, (size_t)length(run->mb) * sizeof(double));
+    return substep(run, s, width, width * run->step->h);
+}
+
+static int due(lw_run *run, double s, int *found) {
+    return lw_events_due(run->mb, run->mb->y, at(run, s), wrench_at(run, s), found, run->step->fault);
+}
+
+/* Shorten the step that was just taken from s until the first event is at its end; returns its length. */
+static int locate(lw_run *run, double s, double *width) {
+    double early = 0.0, late = *width;
+    int found = 1, status = LW_OK;
+    for (int k = 0; k < LW_BISECTIONS && !status; ++k) {
+        double middle = 0.5 * (early + late);
+        if ((status = again(run, s, middle)) || (status = due(run, s + middle, &found))) break;
+        if (found) late = middle;
+        else early = middle;
+    }
+    *width = late;
+    return status ? status : again(run, s, late);
+}
+
+/* The step from s to `end` has been taken: if anything happened on the way, take it up to there, let it happen,
+ * and take the rest. */
+static int watch(lw_run *run, double s, double end, double h) {
+    lw_multibody *mb = run->mb;
+    for (int k = 0; k < LW_MAX_EVENTS && mb->events; ++k) {
+        int found = 0, status = due(run, end, &found);
+        if (status || !found) return status;
+        double width = end - s;
+        run->interrupted = 1;
+        if ((status = locate(run, s, &width))) return status;
+        s += width;
+        status = lw_events_happen(mb, mb->y, at(run, s), h, wrench_at(run, s), run->step->fault);
+        if (status || !(end > s)) return status;
+        remember(mb);
+        if ((status = substep(run, s, end - s, (end - s) * run->step->h))) return status;
+    }
+    run->step->fault->time = s * run->step->h;
+    return mb->events ? LW_CROWDED : LW_OK;
+}
+
+static int equal_substeps(lw_run *run) {
     double h = run->step->h / run->step->substeps, width = 1.0 / run->step->substeps;
     for (int32_t k = 0; k < run->step->substeps; ++k) {
-        double *y = mb->y, *rate = mb->rate[0];
-        int status = derive(run, k * width, y, rate);
+        if (run->mb->events) remember(run->mb);
+        int status = substep(run, k * width, width, h);
+        if (!status) status = watch(run, k * width, (k + 1) * width, h);
         if (status) return status;
-        for (int i = mb->nq; i < length(mb); ++i) y[i] += h * rate[i];
-        lw_coordinate_rate(mb, y, y + mb->nq, rate);
-        for (int i = 0; i < mb->nq; ++i) y[i] += h * rate[i];
-        if ((status = settle(run, y, (k + 1) * width))) return status;
     }
     return LW_OK;
 }
@@ -172,14 +238,18 @@ static double step_factor(double norm) {
 }
 
 /* Take the trial as the state; its rate is known from the last stage, but for the normalised part. */
-static int accept(lw_run *run, double time) {
+static int accept(lw_run *run, double from, double time) {
     lw_multibody *mb = run->mb;
+    remember(mb);
+    run->interrupted = 0;
     memcpy(mb->y, mb->trial, (size_t)length(mb) * sizeof(double));
     double *last = mb->rate[6];
     mb->rate[6] = mb->rate[0];
     mb->rate[0] = last;
     int status = settle(run, mb->y, time / run->step->h);
-    if (!status && (mb->formulation || mb->rows)) return derive(run, time / run->step->h, mb->y, mb->rate[0]);
+    if (!status) status = watch(run, from / run->step->h, time / run->step->h, time - from);
+    if (!status && (mb->formulation || mb->rows || run->interrupted))
+        return derive(run, time / run->step->h, mb->y, mb->rate[0]);
     lw_coordinate_rate(mb, mb->y, mb->y + mb->nq, mb->rate[0]);
     return status;
 }
@@ -208,8 +278,9 @@ static int dormand_prince(lw_run *run) {
         if (norm <= 1.0) {
             /* A step cut short by the end of the macro step says nothing against a longer one. */
             run->proposed = last && clipped ? fmax(next, run->proposed) : next;
+            double from = time;
             time = last ? h : time + step;
-            status = accept(run, time);
+            status = accept(run, from, time);
         } else {
             run->proposed = next;
         }
@@ -221,7 +292,7 @@ static int dormand_prince(lw_run *run) {
 
 static int check_arguments(lw_run *run) {
     const lw_macro_step *step = run->step;
-    if (!(step->h > 0.0) || !isfinite(step->h)) return LW_BAD_STEP;
+    if (!(step->h > 0.0) || !isfinite(step->h) || !isfinite(step->time)) return LW_BAD_STEP;
     if (step->substeps < 1) return LW_BAD_SUBSTEPS;
     if (!(step->rtol >= 0.0 && step->atol > 0.0)) return LW_BAD_TOLERANCE;
     if (lw_polynomial_init(&run->wrench, step->count, step->nodes)) return LW_BAD_NODES;
@@ -231,9 +302,9 @@ static int check_arguments(lw_run *run) {
 
 static int integrate(lw_run *run) {
     switch (run->step->integrator) {
-    case LW_EULER: return runge_kutta(run, &euler);
-    case LW_SEMI_IMPLICIT_EULER: return semi_implicit_euler(run);
-    case LW_RK4: return runge_kutta(run, &rk4);
+    case LW_EULER:
+    case LW_SEMI_IMPLICIT_EULER:
+    case LW_RK4: return equal_substeps(run);
     case LW_DOPRI5: return dormand_prince(run);
     default: return LW_BAD_INTEGRATOR;
     }
@@ -245,12 +316,14 @@ int lw_multibody_advance(lw_multibody *mb, const lw_macro_step *step) {
     int status = check_arguments(&run);
     if (status) return status;
     run.proposed = step->state[coordinates];
+    lw_modes(mb, step->state + coordinates + 1);
     lw_bind_added(mb, step->added_inertia);
     memcpy(mb->y, step->state, (size_t)coordinates * sizeof(double));
     mb->y[coordinates] = mb->y[coordinates + 1] = 0.0;
     if ((status = integrate(&run))) return status;
     memcpy(step->next, mb->y, (size_t)coordinates * sizeof(double));
     step->next[coordinates] = run.proposed;
+    memcpy(step->next + coordinates + 1, mb->happened, (size_t)mb->events * sizeof(double));
     memcpy(step->work, mb->y + coordinates, 2 * sizeof(double));
     return LW_OK;
 }

@@ -122,6 +122,7 @@ void lw_kinematics(lw_multibody *mb, const double *q, const double *v) {
 
 void lw_multibody_motion(lw_multibody *mb, const double *state, lw_unaligned *position,
                          lw_unaligned *orientation, lw_unaligned *linear, lw_unaligned *angular) {
+    lw_modes(mb, state + mb->nq + mb->nv + 1);
     lw_kinematics(mb, state, state + mb->nq);
     for (int i = 0; i < mb->n; ++i) {
         const lw_link *l = &mb->link[i];

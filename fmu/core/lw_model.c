@@ -16,10 +16,11 @@ int32_t lw_closure_row_count(const lw_tables *t) {
 size_t lw_multibody_size(const lw_tables *t) {
     size_t n = (size_t)t->n, nv = (size_t)t->nv, closures = (size_t)t->closures;
     size_t rows = (size_t)lw_closure_row_count(t), paths = closures * n + 1; /* + 1: an even number */
-    size_t doubles = 6 * n + 2 * nv + (size_t)t->nq + (2 + LW_MAX_STAGES) * vector_length(t->nq, t->nv);
-    doubles += rows * nv + 2 * rows * rows + 4 * rows;
+    size_t events = (size_t)t->events;
+    size_t doubles = 12 * n + 2 * nv + (size_t)t->nq + (3 + LW_MAX_STAGES) * vector_length(t->nq, t->nv);
+    doubles += rows * nv + 2 * rows * rows + 4 * rows + 6 * closures + 2 * events;
     return sizeof(lw_multibody) + n * sizeof(lw_link) + closures * sizeof(lw_closure) + rows * sizeof(lw_row) +
-           doubles * sizeof(double) + paths / 2 * 2 * sizeof(int32_t);
+           events * sizeof(lw_event) + doubles * sizeof(double) + paths / 2 * 2 * sizeof(int32_t);
 }
 
 /* Cut the block behind the struct into its arrays. */
@@ -28,7 +29,13 @@ static void lay_out(lw_multibody *mb) {
     mb->link = (lw_link *)(mb + 1);
     mb->closure = (lw_closure *)(mb->link + n);
     mb->row = (lw_row *)(mb->closure + mb->closures);
-    double *next = (double *)(mb->row + rows);
+    mb->event = (lw_event *)(mb->row + rows);
+    double *next = (double *)(mb->event + mb->events);
+    mb->happened = next, next += mb->events;
+    mb->indicator = next, next += mb->events;
+    mb->before = next, next += length;
+    mb->loaded = next, next += 6 * n;
+    mb->closure_load = next, next += 6 * mb->closures;
     mb->spread = next, next += rows * (size_t)mb->nv;
     mb->delassus = next, next += rows * rows;
     mb->factor = next, next += rows * rows;
@@ -70,7 +77,7 @@ static int any_nonzero(const double *values, int count) {
     return 0;
 }
 
-static int translations(int type) {
+int lw_joint_translations(int type) {
     return type == LW_PRISMATIC ? 1 : type == LW_PLANAR ? 2 : type == LW_FREE ? 3 : 0;
 }
 
@@ -99,8 +106,9 @@ static void build_link(lw_link *l, const lw_tables *t, int i) {
     l->type = t->joint_type[i];
     l->q = t->q_index[i];
     l->v = t->v_index[i];
-    l->columns = lw_joint_nv(l->type);
-    l->translations = translations(l->type);
+    l->built = l->type;
+    l->freedoms = l->columns = lw_joint_nv(l->type);
+    l->translations = lw_joint_translations(l->type);
     l->sprung = any_nonzero(t->stiffness + l->v, l->columns);
     l->damped = any_nonzero(t->damping + l->v, l->columns);
     l->mass = t->mass[i];
@@ -116,6 +124,7 @@ int lw_multibody_init(lw_multibody *mb, const lw_tables *t, lw_fault *fault) {
     mb->nv = t->nv;
     mb->formulation = NULL;
     mb->closures = t->closures;
+    mb->events = t->events;
     mb->rows = lw_closure_row_count(t);
     mb->gravity = lw_load3(t->gravity);
     lay_out(mb);
@@ -128,5 +137,6 @@ int lw_multibody_init(lw_multibody *mb, const lw_tables *t, lw_fault *fault) {
         mb->link[k].parent = t->parent[body] < 0 ? -1 : find(mb->link, k, t->parent[body]);
     }
     lw_closures_build(mb, t);
+    lw_events_build(mb, t);
     return LW_OK;
 }

@@ -23,7 +23,9 @@ typedef struct {
 typedef struct {
     /* constant */
     int32_t body, parent; /* row of the tables; link of the parent, -1 = world */
-    int32_t type, q, v, translations, columns;
+    int32_t type, q, v, translations;
+    int32_t freedoms, columns; /* of the type; of them those that are not locked */
+    int32_t built;             /* type that it had at first */
     int32_t parent_rotated, child_rotated, sprung, damped;
     lw_vec3 parent_point, child_point, axis; /* axis: the joint's z in the parent's body frame */
     lw_quat parent_quat, child_quat_inverse;
@@ -47,6 +49,7 @@ typedef struct {
 /* A closure of the tree: joint between two bodies that have their places in it already. */
 typedef struct {
     int32_t kept, row, rows; /* bits of the table; its first row among all, their number */
+    int32_t released;
     int32_t link[2];         /* -1 = world */
     int32_t *path;           /* links that it moves, leaves first: from link[0] and link[1] to where they meet,
                                 and from there to the root */
@@ -55,6 +58,11 @@ typedef struct {
     lw_mat3 rotation[2];
     double length;
 } lw_closure;
+
+typedef struct {
+    int32_t joint, action, occasion;
+    double side, threshold, restitution;
+} lw_event;
 
 /* One scalar equation value(q) = 0 of a closure: rate = on . twists, and rate' = on . accelerations + drift. */
 typedef struct {
@@ -80,7 +88,11 @@ struct lw_multibody {
     lw_vec3 gravity;
     lw_link *link; /* n, in topological order */
     double *stiffness, *damping, *rest;
-    int32_t closures, rows;
+    int32_t closures, rows, events;
+    lw_event *event;   /* events */
+    double *happened, *indicator; /* (events) of the state; how far they are from happening */
+    double *before;    /* q, v, work, dissipated at the start of a substep */
+    double *loaded, *closure_load; /* (n,6), (closures,6): wrench with the forces of closures, these alone */
     lw_closure *closure; /* closures */
     lw_row *row;         /* rows */
     double *spread;      /* (rows,nv) generalised force of each row at each column, as eliminated */
@@ -90,7 +102,8 @@ struct lw_multibody {
     double *y, *trial, *rate[LW_MAX_STAGES]; /* q, v, work, dissipated: state, stage, derivatives */
 };
 
-/* lw_tables.c */
+/* lw_model.c, lw_tables.c */
+int lw_joint_translations(int joint_type);
 int lw_tables_check(const lw_tables *tables, lw_fault *fault);
 /* lw_kinematics.c: poses, velocities, motion vectors and bias accelerations of all links. */
 void lw_kinematics(lw_multibody *multibody, const double *q, const double *v);
@@ -109,6 +122,21 @@ void lw_delassus_respond(lw_multibody *multibody, double *joint_velocity);
 void lw_delassus_close(lw_multibody *multibody, double *joint_acceleration);
 /* lw_projection.c: q and v moved onto the closures. */
 int lw_project(lw_multibody *multibody, double *q, double *v, lw_fault *fault);
+/* lw_events.c: take the joints for what the events of a state have made of them; whether any may still happen;
+ * whether one happens at y; let all of those happen. */
+void lw_events_build(lw_multibody *multibody, const lw_tables *tables);
+void lw_modes(lw_multibody *multibody, const double *happened);
+int lw_events_due(lw_multibody *multibody, const double *y, double time, const double *wrench, int *due,
+                  lw_fault *fault);
+int lw_events_happen(lw_multibody *multibody, double *y, double time, double h, const double *wrench,
+                     lw_fault *fault);
+/* lw_impulse.c: v without what a joint may no longer do, by impulses. */
+int lw_stop_joint(lw_multibody *multibody, const double *q, double *v, lw_link *stopped, lw_fault *fault);
+/* lw_dynamics.c: accelerations, then forces in the joints of the tree and in closures. */
+int lw_loaded_accelerations(lw_multibody *multibody, const double *q, const double *v, const double *wrench,
+                            double *joint_acceleration, double *closure_load, lw_fault *fault);
+lw_spatial lw_joint_reaction(const lw_link *link);
+int lw_impulse_response(lw_multibody *multibody, const double *wrench, double *joint_velocity, lw_fault *fault);
 /* lw_coordinates.c */
 void lw_coordinate_rate(const lw_multibody *multibody, const double *q, const double *v, double *rate);
 void lw_coordinate_normalise(const lw_multibody *multibody, double *q);

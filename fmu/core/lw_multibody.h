@@ -24,11 +24,29 @@ enum {
     LW_DISTANCE = 64
 };
 
+/* What happens to a joint, once, or with stops each time that it is met. */
+typedef enum {
+    LW_RELEASE, /* from then on the joint, or closure, is not there */
+    LW_LOCK,    /* from then on the joint keeps its coordinates */
+    LW_STOP     /* its coordinate goes no further; joints with one degree of freedom */
+} lw_action;
+
+/* What an event waits for. */
+typedef enum {
+    LW_ON_COMMAND,  /* for its number in the state to be below -1.5 */
+    LW_ON_TIME,     /* [s] */
+    LW_ON_FORCE,    /* size of the joint's reaction [N] */
+    LW_ON_TORQUE,   /* likewise, at the joint's point on the child [N m] */
+    LW_ON_POSITION, /* coordinate of a joint with one degree of freedom [rad, m] */
+    LW_ON_SPEED,    /* its rate */
+    LW_ON_DISTANCE  /* between the joint's two points [m] */
+} lw_occasion;
+
 /* A mechanism. Joint i carries body i; q_index and v_index are explicit, so that a joint may own more
  * coordinates than its type needs. Coordinates that no joint uses keep their value. Closures are joints
  * that close loops of the tree. */
 typedef struct {
-    int32_t n, nq, nv, closures;
+    int32_t n, nq, nv, closures, events;
     const int32_t *parent;         /* (n) index of the parent body, -1 = world */
     const int32_t *order;          /* (n) the bodies, every parent before its children */
     const int32_t *joint_type;     /* (n) lw_joint_type */
@@ -49,6 +67,12 @@ typedef struct {
     const double *closure_point;    /* (closures,2,3) on the bodies, body frame, from the COM [m] */
     const double *closure_rotation; /* (closures,2,3,3) frame to body frame */
     const double *closure_length;   /* (closures) distance [m] of LW_DISTANCE */
+    const int32_t *event_joint;     /* (events) joint of a body, or n + closure */
+    const int32_t *event_action;    /* (events) lw_action */
+    const int32_t *event_occasion;  /* (events) lw_occasion */
+    const int32_t *event_side;      /* (events) 1: as soon as at or above the threshold, -1: at or below */
+    const double *event_threshold;  /* (events) */
+    const double *event_restitution; /* (events) of a stop: speed after over speed before, 0 to 1 */
 } lw_tables;
 
 /* 0 is success; `lw_fault` names the item and the time. */
@@ -65,6 +89,7 @@ typedef enum {
     LW_NOT_CONVERGED,        /* item: body whose affine wrench is not met */
     LW_JOINT_OPEN,           /* item: body whose joint cannot be closed */
     LW_OPEN,                 /* item: closure that the mechanism cannot close */
+    LW_CROWDED,              /* item: event that happens too often in a step */
     /* arguments */
     LW_BAD_STEP = 20,
     LW_BAD_NODES,
@@ -92,7 +117,13 @@ typedef enum {
     LW_BAD_CLOSURE_ROWS,
     LW_BAD_CLOSURE_POINT,
     LW_BAD_CLOSURE_ROTATION,
-    LW_BAD_CLOSURE_LENGTH
+    LW_BAD_CLOSURE_LENGTH,
+    LW_BAD_EVENT_JOINT,
+    LW_BAD_EVENT_ACTION,
+    LW_BAD_EVENT_OCCASION,
+    LW_BAD_EVENT_SIDE,
+    LW_BAD_EVENT_THRESHOLD,
+    LW_BAD_EVENT_RESTITUTION
 } lw_status;
 
 typedef struct {
@@ -112,12 +143,14 @@ LW_API size_t lw_multibody_size(const lw_tables *tables);
 /* Check the tables and build the mechanism in `memory`; the tables may go afterwards. */
 LW_API int lw_multibody_init(lw_multibody *memory, const lw_tables *tables, lw_fault *fault);
 
-/* A state is nq + nv + 1 numbers: q, v, and the substep [s] that dopri5 would take next (0 = not known). */
+/* A state is nq + nv + 1 + events numbers: q, v, the substep [s] that dopri5 would take next (0 = not known), and
+ * for each event when it happened [s], or -1; for a stop since when its joint has rested on it. A joint that may
+ * be released needs room in q and v for a free one. */
 
 /* One macro step. */
 typedef struct {
     const double *state;         /* at its start */
-    double h;                    /* its length [s] */
+    double h, time;              /* its length, time at its start [s] */
     const double *nodes;         /* (count) in units of h from its start */
     const double *wrenches;      /* (count,n,6) force, torque in W at the COM: the wrench is the polynomial
                                     through these values at the nodes */
@@ -127,7 +160,7 @@ typedef struct {
     int32_t count, integrator, substeps;
     double *next;                /* out: state at its end; may be the memory of `state` */
     double *work;                /* out (2): work of the whole wrench on the bodies, energy taken by the
-                                    joint dampers [J] */
+                                    joint dampers and by events [J] */
     lw_fault *fault;             /* out, if the status is not 0 */
 } lw_macro_step;
 
@@ -187,6 +220,15 @@ LW_API int lw_multibody_close(lw_multibody *multibody, double *state, lw_fault *
 /* Kinetic and potential energy [J]; gravity counts from the origin of W, springs from their rest. */
 LW_API void lw_multibody_energy(lw_multibody *multibody, const double *state, double *kinetic,
                                 double *potential);
+
+/* Let those happen at a state (in place), at `time` [s], that wait for no more. */
+LW_API int lw_multibody_happen(lw_multibody *multibody, double *state, double time, const double *wrench,
+                               const double *added_inertia, lw_fault *fault);
+
+/* How far each event is from happening under `wrench` (n,6): values (events), at and above 0 it happens. */
+LW_API int lw_multibody_indicators(lw_multibody *multibody, const double *state, double time,
+                                   const double *wrench, const double *added_inertia, double *values,
+                                   lw_fault *fault);
 
 /* Largest distance [m] by which given poses violate a joint or closure. */
 LW_API double lw_multibody_joint_gap(const lw_multibody *multibody, const lw_unaligned *position,

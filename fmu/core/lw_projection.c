@@ -78,6 +78,7 @@ int lw_multibody_close(lw_multibody *mb, double *state, lw_fault *fault) {
     fault->item = row;
     fault->time = 0.0;
     if (row >= 0) return LW_STATE_NOT_FINITE;
+    lw_modes(mb, state + mb->nq + mb->nv + 1);
     lw_bind_added(mb, NULL);
     for (int k = 0; k < 6 * mb->n; ++k) mb->wrench[k] = 0.0;
     return mb->rows ? lw_project(mb, state, state + mb->nq, fault) : LW_OK;

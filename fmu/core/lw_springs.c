@@ -42,7 +42,7 @@ static double link_energy(const lw_multibody *mb, const lw_link *l, const double
     const double *k = mb->stiffness + l->v;
     int rotation = l->type == LW_SPHERICAL || l->type == LW_FREE;
     double energy = 0.0;
-    for (int i = 0; i < (rotation ? l->translations : l->columns); ++i) {
+    for (int i = 0; i < (rotation ? l->translations : l->freedoms); ++i) {
         double stretch = q[l->q + i] - mb->rest[l->q + i];
         energy += 0.5 * k[i] * stretch * stretch;
     }

@@ -40,13 +40,20 @@ static int check_tree(const lw_tables *t, int i) {
 
 static int overlap(int a, int size_a, int b, int size_b) { return a < b + size_b && b < a + size_a; }
 
+/* The type whose coordinates a joint has room for: a free one if it may be released. */
+static int roomy_type(const lw_tables *t, int i) {
+    for (int e = 0; e < t->events; ++e)
+        if (t->event_joint[e] == i && t->event_action[e] == LW_RELEASE) return LW_FREE;
+    return t->joint_type[i];
+}
+
 static int check_coordinates(const lw_tables *t, int i) {
-    int nq = lw_joint_nq(t->joint_type[i]), nv = lw_joint_nv(t->joint_type[i]);
-    if (nq < 0) return LW_BAD_JOINT_TYPE;
+    if (lw_joint_nq(t->joint_type[i]) < 0) return LW_BAD_JOINT_TYPE;
+    int nq = lw_joint_nq(roomy_type(t, i)), nv = lw_joint_nv(roomy_type(t, i));
     if (t->q_index[i] < 0 || t->q_index[i] > t->nq - nq) return LW_BAD_Q_INDEX;
     if (t->v_index[i] < 0 || t->v_index[i] > t->nv - nv) return LW_BAD_V_INDEX;
     for (int k = 0; k < i; ++k) {
-        int other_nq = lw_joint_nq(t->joint_type[k]), other_nv = lw_joint_nv(t->joint_type[k]);
+        int other_nq = lw_joint_nq(roomy_type(t, k)), other_nv = lw_joint_nv(roomy_type(t, k));
         if (nq && other_nq && overlap(t->q_index[i], nq, t->q_index[k], other_nq)) return LW_BAD_Q_INDEX;
         if (nv && other_nv && overlap(t->v_index[i], nv, t->v_index[k], other_nv)) return LW_BAD_V_INDEX;
     }
@@ -117,10 +124,27 @@ static int check_closure(const lw_tables *t, int i) {
     return LW_OK;
 }
 
+/* Position, speed and stops need a joint with one degree of freedom; a closure can only be released. */
+static int check_event(const lw_tables *t, int i) {
+    int32_t joint = t->event_joint[i], action = t->event_action[i], occasion = t->event_occasion[i];
+    if (joint < 0 || joint >= t->n + t->closures) return LW_BAD_EVENT_JOINT;
+    int single = joint < t->n && lw_joint_nv(t->joint_type[joint]) == 1;
+    if (action < LW_RELEASE || action > LW_STOP || (joint >= t->n && action != LW_RELEASE) ||
+        (action == LW_STOP && (!single || occasion != LW_ON_POSITION)))
+        return LW_BAD_EVENT_ACTION;
+    if (occasion < LW_ON_COMMAND || occasion > LW_ON_DISTANCE ||
+        ((occasion == LW_ON_POSITION || occasion == LW_ON_SPEED) && !single))
+        return LW_BAD_EVENT_OCCASION;
+    if (t->event_side[i] != 1 && t->event_side[i] != -1) return LW_BAD_EVENT_SIDE;
+    if (!isfinite(t->event_threshold[i])) return LW_BAD_EVENT_THRESHOLD;
+    if (!(t->event_restitution[i] >= 0.0 && t->event_restitution[i] <= 1.0)) return LW_BAD_EVENT_RESTITUTION;
+    return LW_OK;
+}
+
 int lw_tables_check(const lw_tables *t, lw_fault *fault) {
     fault->item = 0;
     fault->time = 0.0;
-    if (t->n < 1 || t->nq < 0 || t->nv < 0 || t->closures < 0) return LW_BAD_COUNT;
+    if (t->n < 1 || t->nq < 0 || t->nv < 0 || t->closures < 0 || t->events < 0) return LW_BAD_COUNT;
     if (!all_finite(t->gravity, 3)) return LW_BAD_GRAVITY;
     int status = check_coordinate_values(t, fault);
     for (int i = 0; i < t->n && !status; ++i) {
@@ -129,6 +153,10 @@ int lw_tables_check(const lw_tables *t, lw_fault *fault) {
     }
     for (int i = 0; i < t->closures && !status; ++i) {
         status = check_closure(t, i);
+        fault->item = i;
+    }
+    for (int i = 0; i < t->events && !status; ++i) {
+        status = check_event(t, i);
         fault->item = i;
     }
     return status;

@@ -285,7 +285,7 @@ int lw_part_advance(lw_instance *instance, double h, int32_t pieces) {
         pack_wrench(instance, nodes[i] * h, part->wrench + (size_t)i * forces());
     }
     lw_macro_step step = {
-        .state = part->state, .h = h, .nodes = nodes, .wrenches = part->wrench, .count = order + 1,
+        .state = part->state, .h = h, .time = instance->time, .nodes = nodes, .wrenches = part->wrench, .count = order + 1,
         .added_inertia = find_added(instance), .integrator = instance->integers[LW_INTEGRATOR],
         .substeps = pieces > 1 ? 1 : instance->integers[LW_SUBSTEPS],
         .rtol = *AT(RTOL), .atol = *AT(ATOL),

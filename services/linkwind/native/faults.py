@@ -32,9 +32,10 @@ _NUMERICS = {
         "Take a smaller step"),
     10: ("joint {item}", "bodies that close the loop", "a position from which they do not reach",
         "Check points, lengths and the start; a smaller step may help"),
+    11: ("event {item}", "a few times within a step", "a thousand", "Give its stop a smaller restitution"),
 }  # fmt: skip
 _UNNAMED = (3, 6)  # the item is no body
-_CLOSURES = (10,)  # it is a joint that closes a loop
+_KINDS = {10: 1, 11: 2}  # it is a joint that closes a loop, or an event
 _ARGUMENTS = {
     20: ("h", "a positive macro step [s]"),
     21: ("nodes", "1 to 8 distinct finite nodes"),
@@ -45,9 +46,12 @@ _ARGUMENTS = {
 
 
 def fail(
-    status: int, fault: Fault, names: tuple[Sequence[str], Sequence[str]], arguments: dict[str, Any]
+    status: int,
+    fault: Fault,
+    names: Sequence[Sequence[str]],
+    arguments: dict[str, Any],
 ) -> NoReturn:
-    """Raise what the core reported; ``names`` are those of bodies and of closures.
+    """Raise what the core reported; ``names`` are those of bodies, closures and events.
 
     Raises:
         ValueError: one of the ``arguments`` of the call makes no sense.
@@ -56,7 +60,7 @@ def fail(
     if status in _ARGUMENTS:
         name, expected = _ARGUMENTS[status]
         raise ValueError(f"{name}: expected {expected}; got {arguments[name]}. Correct the call.")
-    item = str(fault.item) if status in _UNNAMED else names[status in _CLOSURES][fault.item]
+    item = str(fault.item) if status in _UNNAMED else names[_KINDS.get(status, 0)][fault.item]
     subject, expected, found, repair = (text.format(item=item) for text in _NUMERICS[status])
     raise SimulationError(
         f"{subject}: expected {expected}; got {found}, {fault.time:.9g} s into the step. {repair}."

@@ -16,12 +16,14 @@ from linkwind.native.faults import Fault, fail
 from linkwind.native.library import declare
 from linkwind.native.results import AffineStep, Evaluation, Integrator
 from linkwind.native.tables import (
+    ACTIONS,
     DISTANCE,
     JOINT_TYPES,
     KEEP_ROTATION,
     KEEP_TRANSLATION,
     NQ,
     NV,
+    OCCASIONS,
     QUATERNION_AT,
     CTables,
     Tables,
@@ -31,8 +33,22 @@ from linkwind.native.tables import (
 from linkwind.spatial import Array, Motion, address
 
 __all__ = [
-    "DISTANCE", "JOINT_TYPES", "KEEP_ROTATION", "KEEP_TRANSLATION", "NQ", "NV", "QUATERNION_AT",
-    "AffineStep", "Evaluation", "Integrator", "Multibody", "Tables",
+    "ACTIONS",
+    "DISTANCE",
+    "JOINT_TYPES",
+    "KEEP_ROTATION",
+    "KEEP_TRANSLATION",
+    "NOT_YET",
+    "NQ",
+    "NV",
+    "OCCASIONS",
+    "ORDERED",
+    "QUATERNION_AT",
+    "AffineStep",
+    "Evaluation",
+    "Integrator",
+    "Multibody",
+    "Tables",
 ]  # fmt: skip
 
 
@@ -52,8 +68,9 @@ _energy = declare("lw_multibody_energy", [_pointer] * 4, None)
 _joint_gap = declare("lw_multibody_joint_gap", [_pointer] * 3, _double)
 _repeat = declare("lw_multibody_repeat", [_pointer, _pointer, _int])
 # lw_macro_step: packing all of it at once is several times faster than converting fourteen arguments.
+NOT_YET, ORDERED = -1.0, -2.0  # in a state: an event that has not happened; one that shall, on command
 KNOWN_ARRAYS = 32  # whose addresses are remembered
-_macro_step = struct.Struct("@PdPPPddiiiPPP")
+_macro_step = struct.Struct("@PddPPPddiiiPPP")
 _affine = struct.Struct("@PPPPPP")
 _evaluation = struct.Struct("@PPPPP")
 
@@ -70,16 +87,26 @@ class Multibody:
         nv: number of degrees of freedom of the tree of bodies.
         closures: number of joints that close loops of it.
         rows: number of equations that they are.
-        state_size: length of a state: q, v, and the substep [s] that dopri5 would take next (0 = unknown).
+        events: number of things that may happen to joints.
+        state_size: length of a state: q, v, the substep [s] that dopri5 would take next (0 = unknown), and
+            for each event the time at which it happened [s], or ``NOT_YET``; a stop has since when its joint
+            rests on it.
     """
 
-    def __init__(self, tables: Tables, bodies: Sequence[str] = (), closures: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        tables: Tables,
+        bodies: Sequence[str] = (),
+        closures: Sequence[str] = (),
+        events: Sequence[str] = (),
+    ) -> None:
         """Build the mechanism.
 
         Args:
             tables: the mechanism.
             bodies: names of the bodies, for errors; their numbers if not given.
             closures: likewise of the joints that close loops.
+            events: likewise of what may happen.
 
         Raises:
             MechanismError: a table has a wrong shape or a wrong value.
@@ -88,10 +115,14 @@ class Multibody:
         self.tables = tables
         self.n, self.nq, self.nv = len(tables.parent), len(tables.rest), len(tables.stiffness)
         self.closures = len(tables.closure_rows)
-        self._names = _quoted(bodies, self.n), _quoted(closures, self.closures)
-        self.state_size = self.nq + self.nv + 1
+        self.events = len(tables.event_joint)
+        counts = (self.n, self.closures, self.events)
+        self._names = tuple(map(_quoted, (bodies, closures, events), counts))
+        self.state_size = self.nq + self.nv + 1 + self.events
         pointers = {name: array.ctypes.data for name, array in arrays.items()}
-        native = CTables(n=self.n, nq=self.nq, nv=self.nv, closures=self.closures, **pointers)
+        native = CTables(
+            n=self.n, nq=self.nq, nv=self.nv, closures=self.closures, events=self.events, **pointers
+        )
         self.rows = _row_count(ctypes.addressof(native))
         self._memory = np.zeros((_size(ctypes.addressof(native)) + 7) // 8)
         self._state, self._next = np.zeros(self.state_size), np.zeros(self.state_size)
@@ -129,7 +160,7 @@ class Multibody:
                 raise ValueError(f"{name}: expected shape ({size},); got {np.shape(value)}. See nq and nv.")
             if not np.isfinite(value).all():
                 raise ValueError(f"{name}: expected finite numbers; got {value}. Correct the initial state.")
-        state = np.concatenate([q, v, [0.0]]).astype(np.float64)
+        state = np.concatenate([q, v, [0.0], np.full(self.events, NOT_YET)]).astype(np.float64)
         for code, start in zip(self.tables.joint_type, self.tables.q_index, strict=True):
             if code not in QUATERNION_AT:
                 continue
@@ -153,6 +184,7 @@ class Multibody:
         added_inertia: Array | None,
         *,
         integrator: Integrator | int,
+        time: float = 0.0,
         substeps: int = 1,
         rtol: float = 1e-6,
         atol: float = 1e-9,
@@ -169,19 +201,20 @@ class Multibody:
             added_inertia: A, shape (n, 6, 6), in the body frames, symmetric positive semi-definite,
                 C-contiguous; the force -A a is added to the wrench. Or None.
             integrator: one of ``Integrator``.
+            time: at the start of the step [s], for events.
             substeps: number of equal substeps; of dopri5, h/substeps bounds the first substep.
             rtol: tolerance of dopri5, relative to each coordinate and velocity, per substep.
             atol: its absolute part, in the unit of the coordinate.
 
         Returns:
             The new state, and the work [J], shape (2,): done over the step by the whole wrench, and taken
-            by the joint dampers, integrated with the same scheme.
+            by the joint dampers and by events, integrated with the same scheme.
 
         Raises:
             SimulationError: singular inertia, NaN or infinity, or an underflow of the substep.
             ValueError: an argument that makes no sense, or of a wrong shape.
         """
-        self._prepare(state, h, nodes, wrenches, added_inertia, integrator, substeps, rtol, atol)
+        self._prepare(state, h, nodes, wrenches, added_inertia, integrator, time, substeps, rtol, atol)
         status = _advance(self._model, self._step_at)
         if status:
             arguments = {"h": h, "nodes": nodes, "integrator": integrator, "substeps": substeps}
@@ -190,7 +223,7 @@ class Multibody:
 
     def _prepare(
         self, state: Array, h: float, nodes: Array, wrenches: Array, added_inertia: Array | None,
-        integrator: Integrator | int, substeps: int, rtol: float, atol: float,
+        integrator: Integrator | int, time: float, substeps: int, rtol: float, atol: float,
     ) -> None:  # fmt: skip
         """Fill the ``lw_macro_step``."""
         count = len(nodes)
@@ -198,7 +231,7 @@ class Multibody:
         if wrenches.shape != (count, self.n, 6):
             self._refuse("wrenches", (count, self.n, 6), wrenches)
         _macro_step.pack_into(
-            self._step, 0, self._state_at, h, self._locate(nodes), self._locate(wrenches),
+            self._step, 0, self._state_at, h, time, self._locate(nodes), self._locate(wrenches),
             self._locate_added(added_inertia), rtol, atol, count, integrator, substeps,
             self._next_at, self._work_at, self._fault_at,
         )  # fmt: skip
@@ -214,6 +247,7 @@ class Multibody:
         about: Array,
         *,
         integrator: Integrator | int,
+        time: float = 0.0,
         substeps: int = 1,
         rtol: float = 1e-6,
         atol: float = 1e-9,
@@ -237,7 +271,7 @@ class Multibody:
             self._refuse("response", (m, m), response)
         if about.shape != (n, 6):
             self._refuse("about", (n, 6), about)
-        self._prepare(state, h, nodes, wrenches, added_inertia, integrator, substeps, rtol, atol)
+        self._prepare(state, h, nodes, wrenches, added_inertia, integrator, time, substeps, rtol, atol)
         if not len(self._met):
             self._met, self._scratch = np.zeros(48 * n), np.zeros(_affine_size(n))
         first = self._locate(self._met)

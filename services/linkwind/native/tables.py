@@ -24,6 +24,16 @@ JOINT_TYPES: dict[str, int] = {
 }
 NQ: dict[str, int] = dict(zip(JOINT_TYPES, (0, 1, 1, 3, 4, 7), strict=True))
 NV: dict[str, int] = dict(zip(JOINT_TYPES, (0, 1, 1, 3, 3, 6), strict=True))
+ACTIONS: dict[str, int] = {"release": 0, "lock": 1, "stop": 2}
+OCCASIONS: dict[str, int] = {
+    "command": 0,
+    "time": 1,
+    "force": 2,
+    "torque": 3,
+    "position": 4,
+    "speed": 5,
+    "distance": 6,
+}
 KEEP_TRANSLATION, KEEP_ROTATION, DISTANCE = (1, 2, 4), (8, 16, 32), 64  # bits of closure_rows
 QUATERNION_AT = {JOINT_TYPES["spherical"]: 0, JOINT_TYPES["free"]: 3}
 
@@ -55,6 +65,12 @@ class Tables:
         closure_point: joint frame origins on both bodies, as parent_point, shape (c, 2, 3).
         closure_rotation: joint frames to body frames, shape (c, 2, 3, 3).
         closure_length: distance that a ``DISTANCE`` keeps [m], shape (c,).
+        event_joint: what each of e events happens to: the joint of a body, or n + a closure, int32, shape
+            (e,).
+        event_action, event_occasion: codes of ``ACTIONS`` and ``OCCASIONS``, int32, shape (e,).
+        event_side: 1 for at or above the threshold, -1 for at or below it, int32, shape (e,).
+        event_threshold: [s, N, N·m, rad, m or per second], shape (e,).
+        event_restitution: of a stop, 0 to 1, shape (e,).
     """
 
     parent: Index
@@ -77,12 +93,18 @@ class Tables:
     closure_point: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))
     closure_rotation: Array = field(default_factory=lambda: np.zeros((0, 2, 3, 3)))
     closure_length: Array = field(default_factory=lambda: np.zeros(0))
+    event_joint: Index = field(default_factory=lambda: np.zeros(0, np.int32))
+    event_action: Index = field(default_factory=lambda: np.zeros(0, np.int32))
+    event_occasion: Index = field(default_factory=lambda: np.zeros(0, np.int32))
+    event_side: Index = field(default_factory=lambda: np.zeros(0, np.int32))
+    event_threshold: Array = field(default_factory=lambda: np.zeros(0))
+    event_restitution: Array = field(default_factory=lambda: np.zeros(0))
 
 
 class CTables(ctypes.Structure):
     """``lw_tables`` of the library."""
 
-    _fields_ = [(name, ctypes.c_int32) for name in ("n", "nq", "nv", "closures")] + [
+    _fields_ = [(name, ctypes.c_int32) for name in ("n", "nq", "nv", "closures", "events")] + [
         (table.name, ctypes.c_void_p) for table in fields(Tables)
     ]
 
@@ -109,22 +131,33 @@ _CHECKS = {
     58: ("closure_point", "finite numbers"),
     59: ("closure_rotation", "rotation matrices"),
     60: ("closure_length", "a distance above zero"),
+    61: ("event_joint", "a joint or closure"),
+    62: ("event_action", "something that can happen to this joint"),
+    63: ("event_occasion", "something that this joint has"),
+    64: ("event_side", "1 or -1"),
+    65: ("event_threshold", "a finite number"),
+    66: ("event_restitution", "a number from 0 to 1"),
 }
 
 
-_INTEGERS = ("parent", "order", "joint_type", "q_index", "v_index", "closure_body", "closure_rows")
+_INTEGERS = (
+    "parent", "order", "joint_type", "q_index", "v_index", "closure_body", "closure_rows", "event_joint",
+    "event_action", "event_occasion", "event_side",
+)  # fmt: skip
 
 
-def _shapes(n: int, nq: int, nv: int, closures: int) -> dict[str, tuple[int, ...]]:
+def _shapes(n: int, nq: int, nv: int, closures: int, events: int) -> dict[str, tuple[int, ...]]:
     integers = dict.fromkeys(("parent", "order", "joint_type", "q_index", "v_index"), (n,))
     points = dict.fromkeys(("parent_point", "child_point"), (n, 3))
     rotations = dict.fromkeys(("parent_rotation", "child_rotation"), (n, 3, 3))
     degrees = dict.fromkeys(("stiffness", "damping"), (nv,))
+    happening = ("joint", "action", "occasion", "side", "threshold", "restitution")
     closed = {"body": (2,), "rows": (), "point": (2, 3), "rotation": (2, 3, 3), "length": ()}
     return (
         {"mass": (n,), "inertia": (n, 6), "gravity": (3,), "rest": (nq,)}
         | integers | points | rotations | degrees
         | {f"closure_{name}": (closures, *shape) for name, shape in closed.items()}
+        | {f"event_{name}": (events,) for name in happening}
     )  # fmt: skip
 
 
@@ -132,7 +165,7 @@ def contiguous(tables: Tables) -> dict[str, NDArray[Any]]:
     """Return the tables as contiguous arrays of the right type, or raise MechanismError for a shape."""
     n, nq, nv = np.size(tables.parent), np.size(tables.rest), np.size(tables.stiffness)
     arrays = {}
-    for name, shape in _shapes(n, nq, nv, np.size(tables.closure_rows)).items():
+    for name, shape in _shapes(n, nq, nv, np.size(tables.closure_rows), np.size(tables.event_joint)).items():
         wanted = np.int32 if name in _INTEGERS else np.float64
         arrays[name] = np.ascontiguousarray(getattr(tables, name), dtype=wanted)
         if np.shape(getattr(tables, name)) != shape:
