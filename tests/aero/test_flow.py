@@ -44,6 +44,16 @@ def test_a_light_plate_accelerates_by_its_mass_and_the_added_mass(ratio):
         assert free.fastest(plain) > 100.0 * free.fastest(flight)
 
 
+@pytest.mark.parametrize(("carried", "ratio"), [(0.2, 1.0), (0.9, 2.0)])  # two lattice steps in one, eight
+def test_several_lattice_steps_in_one_hold_a_plate_of_that_mass_over_the_added_mass(carried, ratio):
+    flight = free.flown(free.light_plate(ratio, "pec", cells=32, steps=400, carried=carried))
+    assert free.acceleration(flight) == pytest.approx(1e-6 / 32 / 1e-6, rel=0.06)
+    gone = np.diff(flight.linear[250:, 0, 1])
+    assert gone.std() < 0.2 * gone.mean()
+    light = free.light_plate(0.3 * ratio, "pec", cells=32, steps=400, carried=carried)
+    assert free.fastest(free.flown(light, to_the_end=False)) > 100.0 * free.fastest(flight)  # too light
+
+
 def test_impulse_is_kept():
     assert all(row.ok for row in balance.impulse(short=True).rows)
 

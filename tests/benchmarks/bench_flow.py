@@ -2,8 +2,9 @@
 
 - A step of a lattice with fringe and force, on one thread, against a loop that copies the same bytes, nine
   floats read and nine written per cell (``copy_planes.c``), in rounds that take turns; the median of the
-  rounds' ratios counts. One size is that of the paper's case, the other is far outside of the caches. There
-  ``memcpy`` is faster than any loop, because it writes past the caches; that row has no target.
+  rounds' ratios counts. It may be above 1: one thread steps a lattice in a single memory. One size is that of
+  the paper's case, the other is far outside of the caches. There ``memcpy`` is faster than any loop, because
+  it writes past the caches; that row has no target.
 - The same number of cells in icoFoam (``openfoam_case.py``), on one thread, processor time per step. With the
   lattice's own time step, and with eight times as long a one, per time that passes in the flow: an implicit
   solver may take it.

@@ -92,6 +92,7 @@ class Boundary:
         self._self = ctypes.addressof(self._struct)
         self._marker, self._pose, self._twist = ctypes.c_int32(), np.zeros((n, 4)), np.zeros((n, 3))
         self._pose_at, self._twist_at = address(self._pose), address(self._twist)
+        self._marker_at = ctypes.addressof(self._marker)
         self._out = address(self.wrench), address(self.response)
         pointer = ctypes.c_void_p
         self._place = declare("lw_boundary_place", [pointer] * 4)
@@ -111,9 +112,8 @@ class Boundary:
             What came of it, and the marker that it is about.
         """
         self._pose[:] = pose
-        marker = ctypes.addressof(self._marker)
-        status = self._place(self._self, lattice.struct_address, self._pose_at, marker)
-        return Placement(status), self._marker.value
+        status = self._place(self._self, lattice.struct_address, self._pose_at, self._marker_at)
+        return (Placement(status) if status else Placement.PLACED), self._marker.value
 
     def evaluate(self, twist: Array) -> None:
         """Compute ``wrench`` and ``response`` for twists at the end of the step, shape (n, 3), where "

@@ -133,9 +133,9 @@ class ProviderSession:
         """
         motion = self._motion
         motion.load(payload, f'"{self.name}": motion')
-        at = motion.at
+        at, time_ns = motion.at, motion.time_ns
         if motion.final:
-            self._commit(motion.at[0], motion.time_ns)
+            self._commit(at[0], time_ns)
             self._show()
             self.state = ProviderState.DONE
             return None
@@ -146,9 +146,9 @@ class ProviderSession:
                 '"%s": dropped a stale motion message (step %d after %d)', self.name, at[0], self.at[0]
             )
             return None
-        self._advance(*at)
-        self._model.evaluate(motion.time_ns / 1e9, motion.trial, self._wrench.wrench)
-        self._wrench.stamp(at[0], at[1], motion.time_ns)
+        self._advance(*at, time_ns)
+        self._model.evaluate(time_ns / 1e9, motion.trial, self._wrench.wrench)
+        self._wrench.stamp(*at, time_ns)
         self.at = at
         self._answer = self._wrench.payload()
         self._show()
@@ -172,13 +172,12 @@ class ProviderSession:
         taken, self._frames = self._frames, []
         return taken
 
-    def _advance(self, step: int, iteration: int) -> None:
+    def _advance(self, step: int, iteration: int, time_ns: int) -> None:
         """Commit the accepted state when the step is new; another iteration evaluates from there again."""
-        motion = self._motion
         last_step, last_iteration = self.at
         if step == last_step + 1 and iteration == 0:
             if step:
-                self._commit(last_step, motion.time_ns - self._step_ns)
+                self._commit(last_step, time_ns - self._step_ns)
         elif step == last_step and iteration == last_iteration + 1:
             if not self._model.capabilities.rollback:
                 raise ProtocolError(f'"{self.name}": iteration {iteration} asked, but it cannot roll back')

@@ -42,8 +42,10 @@ def flown(scenario: Scenario, to_the_end: bool = True) -> Trajectory:
         return open_log(out / "log.mcap").trajectory()
 
 
-def light_plate(ratio: float, scheme: str, *, cells: int = 48, steps: int = 1000) -> Scenario:
-    """Return a plate at rest that a constant force pushes along its normal.
+def light_plate(
+    ratio: float, scheme: str, *, cells: int = 48, steps: int = 1000, carried: float = 0.0
+) -> Scenario:
+    """Return a plate at rest in the fluid that a constant force pushes along its normal.
 
     The force comes up over the first 200 steps, and is such that the plate shall accelerate by 1e-6 cells a
     step², so that it moves by half a cell.
@@ -53,14 +55,18 @@ def light_plate(ratio: float, scheme: str, *, cells: int = 48, steps: int = 1000
         scheme: of the coupling.
         cells: along the plate.
         steps: of the run.
+        carried: speed of the fluid, and of the plate with it, along the plate [cells/step]. Above 0.12 there
+            are several lattice steps in a step.
     """
     step = 1e-3
     cell = 1.0 / cells
     force = 1e-6 * cell / step**2 * (1.0 + ratio) * ADDED_MASS
+    speed = carried * cell / step
     body = f"mass = {ratio * ADDED_MASS!r}\ninertia = {max(ratio, 1e-4) * ADDED_INERTIA!r}"
     text = scene(
-        PLATE, cells=cells, step=step, viscosity=1e-6 * cell**2 / step, window=(10.0, 10.0), body=body
-    )
+        PLATE, cells=cells, step=step, viscosity=1e-6 * cell**2 / step, window=(10.0, 10.0),
+        wind=(speed, 0.0), body=f"{body}\nvelocity = [{speed!r}, 0.0]",
+    )  # fmt: skip
     text = text.replace("[aero]", '[[providers]]\nname = "fluid"').replace("[aero.flow]", "[providers.flow]")
     return loads(
         f"""{text}
