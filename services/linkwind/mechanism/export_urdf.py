@@ -54,7 +54,7 @@ def export_urdf(scenario: Scenario) -> Exported:
     for index, body in enumerate(scenario.bodies):
         root.append(_link(body, -mechanism.tables.child_point[index], mechanism.tables.inertia[index]))
         root.extend(_joints(scenario, mechanism, index))
-    remarks = (*_of_joints(scenario), *_of_bodies(scenario), *_of_surroundings(scenario))
+    remarks = (*_of_joints(scenario, mechanism.closures), *_of_bodies(scenario), *_of_surroundings(scenario))
     ET.indent(root)
     lines = [f"Exported by linkwind from {scenario.name}.", *comment(remarks)]
     note = "\n".join(lines).replace("--", "- -")  # which would end an XML comment
@@ -152,13 +152,15 @@ def _cylinder(diameter: float, length: float) -> ET.Element:
     return ET.Element("cylinder", radius=repr(diameter / 2), length=repr(length))
 
 
-def _of_joints(scenario: Scenario) -> Iterator[Remark]:
+def _of_joints(scenario: Scenario, closures: tuple[str, ...]) -> Iterator[Remark]:
     for joint in scenario.joints:
         if np.any(joint.stiffness):
             yield Remark("springs", "the format has none", joint.name)
         if np.any(joint.damping) and joint.type not in ("revolute", "prismatic"):
             yield Remark("dampers", f"the format has none of a {joint.type} joint", joint.name)
-        if joint.type == "spherical":
+        if joint.name in closures:
+            yield Remark("loops", "the format has trees only", joint.name)
+        elif joint.type == "spherical":
             yield Remark("spherical joints", "three about x, y, z, which lock at a right angle", joint.name)
 
 

@@ -5,7 +5,10 @@ import numpy as np
 import pytest
 
 from linkwind.errors import InputError
+from linkwind.mechanism import build
+from linkwind.mechanism.export_urdf import export_urdf
 from linkwind.mechanism.importers import import_file
+from linkwind.native.multibody import Multibody
 from tests.mechanism.importers.robots import Pair
 
 ROBOT = """
@@ -48,7 +51,7 @@ ROBOT = """
   <tendon><fixed name="cord"><joint joint="hip_x" coef="1"/></fixed></tendon>
   <actuator><motor name="m" joint="hip_x"/></actuator>
   <sensor><gyro name="gyro" site="imu"/></sensor>
-  <equality><connect name="loop" body1="foot" body2="trunk" anchor="0 0 0"/></equality>
+  <equality><joint name="geared" joint1="sx" joint2="sy"/></equality>
 </mujoco>
 """
 
@@ -82,7 +85,7 @@ def test_what_was_left_out_is_named(tmp_path):
     assert left["joint limits"] == ["hip_y"]
     assert left["armatures"] == ["hip_y"]
     assert left["joint frictions"] == ["knee"]
-    assert left["equality constraints"] == ["loop"]
+    assert left["equality constraints"] == ["geared"]
     assert (left["tendons"], left["actuators"], left["sensors"]) == (["cord"], ["m"], ["gyro"])
     assert left["contacts"] == ["world", "trunk", "thigh", "shin", "foot", "toe"]
 
@@ -102,7 +105,7 @@ def test_a_base_is_for_urdf(tmp_path):
 
 def test_what_mujoco_refuses(tmp_path):
     with pytest.raises(InputError, match=r"robot\.xml: MuJoCo refuses it: .*'nobody'.*Correct it\.$"):
-        imported(tmp_path, ROBOT.replace('body1="foot"', 'body1="nobody"'))
+        imported(tmp_path, ROBOT.replace('joint1="sx"', 'joint1="nobody"'))
 
 
 def test_pictures_are_where_mujoco_has_the_geometry(tmp_path):
@@ -118,3 +121,77 @@ def test_pictures_are_where_mujoco_has_the_geometry(tmp_path):
         turned = np.zeros(9)
         mujoco.mju_quat2Mat(turned, np.array(picture.orientation))
         np.testing.assert_allclose(turned, data.geom_xmat[geom], atol=1e-13)
+
+
+LOOP = """
+<mujoco>
+  <worldbody>
+    <body name="crank" pos="0 0 1" euler="0 10 0">
+      <joint name="a" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 0.3" size="0.02"/>
+      <body name="rod" pos="0 0 0.3" euler="0 80 0">
+        <joint name="b" type="ball"/><geom type="capsule" fromto="0 0 0 0 0 1" size="0.02"/>
+        <site name="end" pos="0 0 1"/>
+      </body>
+    </body>
+    <body name="rocker" pos="1 0 1">
+      <joint name="c" axis="0 1 0.1"/><geom type="capsule" fromto="0 0 0 0 0 0.5" size="0.03"/>
+    </body>
+    <body name="floating" pos="2 0 1"><freejoint/><geom size="0.1"/></body>
+  </worldbody>
+  <equality>
+    <connect name="pin" body1="rod" body2="rocker" anchor="0 0 0.9"/>
+    <weld name="held" body1="rocker" body2="floating"/>
+    <weld name="twisted" body1="crank" body2="floating" relpose="0 0 0 0.6 0.8 0 0"/>
+    <connect name="inactive" body1="rod" body2="floating" anchor="0 0 0" active="false"/>
+  </equality>
+</mujoco>
+"""
+
+
+def constrained(compiled):
+    """Accelerations at rest at qpos0 under connect and weld as equations, from MuJoCo's matrices."""
+    data = mujoco.MjData(compiled)
+    mujoco.mj_forward(compiled, data)
+    m, nv, rows = compiled, compiled.nv, []
+    for name, turns in (("pin", False), ("held", True)):
+        e = mujoco.mj_name2id(m, mujoco.mjtObj.mjOBJ_EQUALITY, name)
+        body1, body2, given = m.eq_obj1id[e], m.eq_obj2id[e], m.eq_data[e]
+        point = data.xpos[body1] + data.xmat[body1].reshape(3, 3) @ given[3:6] if turns else None
+        point = point if turns else data.xpos[body1] + data.xmat[body1].reshape(3, 3) @ given[0:3]
+        both = np.zeros((2, 2, 3, nv))
+        for k, body in enumerate((body1, body2)):
+            mujoco.mj_jac(m, data, both[k, 0], both[k, 1], point, body)
+        rows += [both[1, 0] - both[0, 0]] + ([both[1, 1] - both[0, 1]] if turns else [])
+    jacobian, mass = np.vstack(rows), np.zeros((nv, nv))
+    mujoco.mj_fullM(m, mass, data.qM) if hasattr(data, "qM") else mujoco.mj_fullM(m, data, mass)
+    force = data.qfrc_passive - data.qfrc_bias
+    free, moved = np.linalg.solve(mass, force), np.linalg.solve(mass, jacobian.T)
+    return data, free, free - moved @ np.linalg.lstsq(jacobian @ moved, jacobian @ free, rcond=1e-12)[0]
+
+
+def test_connect_and_weld_close_loops(tmp_path):
+    got = imported(tmp_path, LOOP)
+    closures = [(joint.name, joint.type, joint.parent, joint.child) for joint in got.scenario.joints[-2:]]
+    assert closures == [("pin", "spherical", "rod", "rocker"), ("held", "fixed", "rocker", "floating")]
+    left = {remark.item: remark.why for remark in got.remarks if remark.what == "equality constraints"}
+    assert left == {"twisted": "they are twisted at the joints' zero", "inactive": "they do not hold"}
+    compiled = mujoco.MjModel.from_xml_string(LOOP)
+    data, free, expected = constrained(compiled)
+    assert np.abs(expected - free).max() > 1.0  # the loops matter
+    mechanism = build(got.scenario)
+    core = Multibody(mechanism.tables, mechanism.bodies, mechanism.closures)
+    found = core.evaluate(core.initial_state(mechanism.q0, mechanism.v0), np.zeros((core.n, 6)))
+    data.qacc[:] = expected
+    mujoco.mj_rnePostConstraint(compiled, data)
+    scale = np.abs(found.acceleration).max()
+    for i, name in enumerate(mechanism.bodies):
+        body, both = mujoco.mj_name2id(compiled, mujoco.mjtObj.mjOBJ_BODY, name), np.zeros(6)
+        mujoco.mj_objectAcceleration(compiled, data, mujoco.mjtObj.mjOBJ_BODY, body, both, 0)
+        np.testing.assert_allclose(found.acceleration[i, 3:], both[:3], atol=1e-9 * scale)
+    lost = {remark.item for remark in export_urdf(got.scenario).remarks if remark.what == "loops"}
+    assert lost == {"pin", "held"}
+
+
+def test_a_weld_keeps_the_start_at_zero(tmp_path):
+    with pytest.raises(InputError, match=r"--at a=0\.1: expected no weld that closes a loop; got held\."):
+        imported(tmp_path, LOOP, at=["a=0.1"])

@@ -59,7 +59,13 @@ def import_file(
     """
     model = _read(path, base)
     settle(model, path, repair)
-    text = scenario_text(model, path.name, __version__, parse(at, model))
+    start = parse(at, model)
+    welds = [closure.name for closure in model.closures if closure.type == "fixed"]
+    if start and welds:
+        raise InputError(
+            f"--at {at[0]}: expected no weld that closes a loop; got {welds[0]}. Leave out --at."
+        )
+    text = scenario_text(model, path.name, __version__, start)
     scenario = loads(text, str(path))
     _refuse_singular(scenario, path)
     return Imported(model.kind, text, scenario, tuple(model.remarks))

@@ -5,13 +5,14 @@ Several joints of one body become a chain: one massless body for each joint but 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from linkwind.errors import InputError
-from linkwind.mechanism.importers.model import WORLD, Joint, Model, Part, Picture, Pose
+from linkwind.mechanism.importers.model import ORIGIN, WORLD, Closure, Joint, Model, Part, Picture, Pose
 from linkwind.mechanism.quaternion import inverse, matrix, product
 from linkwind.native.tables import NQ, NV
 
@@ -72,6 +73,7 @@ class _Reader:
             model.parts.append(self._part(body, parent, joints[-1]))
             last[body] = len(model.parts) - 1
         self._note_left_out(model)
+        self._add_closures(model, last)
         return model
 
     def _name(self, kind: str, index: int) -> str:
@@ -159,6 +161,41 @@ class _Reader:
         scale = np.array(self.m.mesh_scale[mesh]).tolist()
         return Picture(keys if scale == [1.0, 1.0, 1.0] else keys | {"scale": scale}, pose.then(back))
 
+    def _add_closures(self, model: Model, last: Mapping[int, int]) -> None:
+        """Add what closes loops; other equality constraints are left out."""
+        kinds, m = self.mujoco.mjtEq, self.m
+        types = {kinds.mjEQ_CONNECT: "spherical", kinds.mjEQ_WELD: "fixed"}
+        for index in range(m.neq):
+            name, kind = self._name("EQUALITY", index), kinds(int(m.eq_type[index]))
+            bodies, ends = self._ends(index)
+            if kind not in types or not m.eq_active0[index]:
+                why = "they do not hold"
+            elif kind == kinds.mjEQ_WELD and np.abs(ends[0].rotation - ends[1].rotation).max() > 1e-6:
+                why = "they are twisted at the joints' zero"
+            else:
+                points = np.array([end.position for end in ends])
+                parts = last[bodies[0]], last[bodies[1]]
+                model.closures.append(Closure(name, types[kind], parts, points))
+                continue
+            model.leave_out("equality constraints", why, [name])
+
+    def _ends(self, index: int) -> tuple[tuple[int, int], tuple[Pose, Pose]]:
+        """Return the bodies of a connect or weld, and the frames that it makes coincide, at qpos0."""
+        m, data = self.m, self.data
+        ids = int(m.eq_obj1id[index]), int(m.eq_obj2id[index])
+        if m.eq_objtype[index] == self.mujoco.mjtObj.mjOBJ_SITE:
+            sites = [Pose(data.site_xpos[site], data.site_xmat[site].reshape(3, 3)) for site in ids]
+            return (int(m.site_bodyid[ids[0]]), int(m.site_bodyid[ids[1]])), (sites[0], sites[1])
+        if m.eq_objtype[index] != self.mujoco.mjtObj.mjOBJ_BODY:
+            return (0, 0), (ORIGIN, ORIGIN)
+        first, second = (Pose(data.xpos[body], data.xmat[body].reshape(3, 3)) for body in ids)
+        given = np.array(m.eq_data[index])
+        if m.eq_type[index] == self.mujoco.mjtEq.mjEQ_WELD:
+            own = Pose(given[3:6], matrix(given[6:10])), Pose(given[0:3], np.eye(3))
+        else:
+            own = Pose(given[0:3], np.eye(3)), Pose(given[3:6], np.eye(3))
+        return ids, (first.then(own[0]), second.then(own[1]))
+
     def _note_left_out(self, model: Model) -> None:
         m, out = self.m, model.leave_out
         joints = [self._name("JOINT", j) for j in range(m.njnt)]
@@ -178,7 +215,6 @@ class _Reader:
             _each(of, getattr(m, "dof_dampingpoly", None)),
         )
         for what, why, kind, count in (
-            ("equality constraints", "they do not hold", "EQUALITY", m.neq),
             ("tendons", "there are none, nor their springs, dampers and limits", "TENDON", m.ntendon),
             ("actuators", "joints have no motors", "ACTUATOR", m.nu),
             ("sensors", "they do not matter to the motion", "SENSOR", m.nsensor),
@@ -187,6 +223,8 @@ class _Reader:
         ):
             out(what, why, [self._name(kind, i) for i in range(count)])
         out("gravity compensations", "gravity acts on all bodies", _each(bodies, m.body_gravcomp))
+        driven = np.array(m.body_mocapid) >= 0
+        out("motion captures", "the bodies stay where they are", _each(bodies, driven))
         out("plugins", "they belong to MuJoCo", _each(bodies, np.array(m.body_plugin) >= 0))
         touching = np.array(m.body_contype) | np.array(m.body_conaffinity)
         out("contacts", "bodies do not touch", _each(bodies, touching))

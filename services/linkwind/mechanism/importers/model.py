@@ -123,6 +123,23 @@ def about(part: Part, point: Array) -> Array:
 
 
 @dataclass
+class Closure:
+    """A joint that closes a loop, in the world at the joints' zero.
+
+    Attributes:
+        name: as in the file.
+        type: one of a scenario's joint types.
+        ends: indices of two parts; one may be WORLD.
+        points: the joint's point on each, shape (2, 3) [m]; the file may leave the loop open at the zero.
+    """
+
+    name: str
+    type: str
+    ends: tuple[int, int]
+    points: Array
+
+
+@dataclass
 class Model:
     """A file, read.
 
@@ -130,6 +147,7 @@ class Model:
         kind: URDF or MJCF.
         name: of the robot, as in the file.
         parts: parents before children.
+        closures: what closes loops.
         gravity: [m/s²], shape (3,).
         remarks: what was left out or changed.
     """
@@ -138,6 +156,7 @@ class Model:
     name: str
     parts: list[Part]
     gravity: Array
+    closures: list[Closure] = field(default_factory=list)
     remarks: list[Remark] = field(default_factory=list)
 
     def leave_out(self, what: str, why: str, items: Iterable[str]) -> None:

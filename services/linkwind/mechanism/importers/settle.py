@@ -26,6 +26,9 @@ def settle(model: Model, file: Path, repair: bool) -> None:
     _forget_round_off(model)
     _keep(model, _merged(model))
     _keep(model, _idle(model))
+    inside = [closure for closure in model.closures if len(set(closure.ends)) == 1]
+    model.leave_out("loops", "both ends are in one body", [closure.name for closure in inside])
+    model.closures = [closure for closure in model.closures if closure not in inside]
     if not model.parts:
         raise InputError(f"{file}: expected a link with mass; got none. Give links inertials.")
     for part in model.parts:
@@ -72,7 +75,7 @@ def _merged(model: Model) -> dict[int, int]:
 def _idle(model: Model) -> dict[int, int]:
     """Find moving parts without mass on which nothing hangs: nothing feels them. Their pictures stay."""
     into: dict[int, int] = {}
-    carrying: set[int] = set()
+    carrying = {end for closure in model.closures for end in closure.ends}
     for i, part in reversed(list(enumerate(model.parts))):
         if not part.bare or i in carrying:
             carrying.add(part.parent)
@@ -92,6 +95,9 @@ def _keep(model: Model, into: dict[int, int]) -> None:
     for part in parts:
         part.parent = place[into.get(part.parent, part.parent)]
     model.parts = parts
+    for closure in model.closures:
+        first, second = (place[into.get(end, end)] for end in closure.ends)
+        closure.ends = first, second
 
 
 def _repair(part: Part) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from linkwind.mechanism.importers.configuration import displacements
-from linkwind.mechanism.importers.model import WORLD, Model, Part, Pose
+from linkwind.mechanism.importers.model import WORLD, Closure, Model, Part, Pose
 from linkwind.mechanism.quaternion import from_matrix
 from linkwind.mechanism.remarks import comment, wrapped
 from linkwind.spatial import Array
@@ -31,12 +31,15 @@ def scenario_text(model: Model, source: str, version: str, start: Mapping[str, f
     lines = [*_header(model, source, version), *_settings(model)]
     for i, part in enumerate(model.parts):
         lines += ["", *_body(part, bodies[i], placed, i, start)]
+    frames = {WORLD: ("world", np.zeros(3))}
+    frames |= {i: (bodies[i], part.centre) for i, part in enumerate(model.parts)}
+    held = {end for closure in model.closures for end in closure.ends}
     for i, part in enumerate(model.parts):
-        if part.joint.type != "free" or part.parent != WORLD or part.joint.stiffness or part.joint.damping:
-            parent, centre = "world", np.zeros(3)
-            if part.parent != WORLD:
-                parent, centre = bodies[part.parent], model.parts[part.parent].centre
-            lines += ["", *_joint(part, joints[i], bodies[i], parent, centre)]
+        free = part.joint.type == "free" and part.parent == WORLD and i not in held
+        if not free or part.joint.stiffness or part.joint.damping:
+            lines += ["", *_joint(part, joints[i], bodies[i], *frames[part.parent])]
+    for closure, name in zip(model.closures, names([c.name for c in model.closures], joints), strict=True):
+        lines += ["", *_closure(closure, name, frames)]
     return "\n".join(lines) + "\n"
 
 
@@ -132,6 +135,19 @@ def _joint(part: Part, name: str, child: str, parent: str, centre: Array) -> Ite
         yield f"rest = {_number(joint.rest[0]) if single else _row(np.array(joint.rest))}"
     if np.any(joint.damping):
         yield f"damping = {_any(joint.damping)}    # {'N·m·s/rad' if turns else 'N·s/m'}"
+
+
+def _closure(closure: Closure, name: str, frames: Mapping[int, tuple[str, Array]]) -> Iterator[str]:
+    """Yield a joint that closes a loop; the world is never its child."""
+    way = [0, 1] if closure.ends[1] != WORLD else [1, 0]
+    (parent, parent_centre), (child, child_centre) = (frames[closure.ends[end]] for end in way)
+    yield "[[joints]]    # closes a loop"
+    yield f'name = "{name}"' + ("" if name == closure.name else f"    # {_string(closure.name)} in the file")
+    yield f'type = "{closure.type}"'
+    yield f'parent = "{parent}"'
+    yield f'child = "{child}"'
+    yield f"parent_point = {_row(closure.points[way[0]] - parent_centre)}    # m"
+    yield f"child_point = {_row(closure.points[way[1]] - child_centre)}    # m"
 
 
 def _any(value: float | list[float]) -> str:
