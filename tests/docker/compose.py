@@ -31,7 +31,8 @@ def docker(*arguments: str) -> str:
 class Project:
     """One compose project: its containers, its network, its folders."""
 
-    def __init__(self, folder: Path, image: str) -> None:
+    def __init__(self, folder: Path, image: str, *more: str) -> None:
+        self._files = [part for name in ("compose.yaml", *more) for part in ("-f", f"docker/{name}")]
         self.name = f"lw{uuid.uuid4().hex[:8]}"
         self.folders = {name: folder / name for name in ("runs", "scenarios", "fmus")}
         for path in self.folders.values():
@@ -46,7 +47,7 @@ class Project:
         """Start ``docker-compose ARGUMENTS`` with LINKWIND_… settings."""
         given = {f"LINKWIND_{name}": value for name, value in settings.items()}
         process = subprocess.Popen(
-            ["docker-compose", "-f", "docker/compose.yaml", "-p", self.name, "--ansi", "never", *arguments],
+            ["docker-compose", *self._files, "-p", self.name, "--ansi", "never", *arguments],
             cwd=ROOT,
             env=os.environ | self._settings | given,
             stdout=subprocess.PIPE,
@@ -84,11 +85,10 @@ class Project:
             time.sleep(0.02)
 
     def leftovers(self) -> list[str]:
-        """Return the containers and networks of the project that are still there."""
-        label = f"label=com.docker.compose.project={self.name}"
-        return (
-            docker("ps", "-aq", "--filter", label) + docker("network", "ls", "-q", "--filter", label)
-        ).split()
+        """Return the containers, networks and volumes of the project that are still there."""
+        of_it = ("-q", "--filter", f"label=com.docker.compose.project={self.name}")
+        kinds = ["ps", "-a"], ["network", "ls"], ["volume", "ls"]
+        return [left for kind in kinds for left in docker(*kind, *of_it).split()]
 
     def end(self) -> None:
         """Remove everything, whatever happened."""
@@ -96,7 +96,7 @@ class Project:
             if process.poll() is None:
                 process.kill()
             process.communicate()
-        self.do("--profile", "force-fmu", "down", "--remove-orphans", "--timeout", "5")
+        self.do("--profile", "force-fmu", "down", "--remove-orphans", "--volumes", "--timeout", "5")
 
 
 def linkwind(*arguments: str) -> str:

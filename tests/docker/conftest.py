@@ -29,3 +29,11 @@ def project(tmp_path: Path, image: str) -> Iterator[Project]:
     yield started
     started.end()
     assert not started.leftovers()
+
+
+@pytest.fixture
+def secure(tmp_path: Path, image: str) -> Iterator[Project]:
+    started = Project(tmp_path, image, "compose.secure.yaml")
+    yield started
+    started.end()
+    assert not started.leftovers()

@@ -19,8 +19,11 @@ from linkwind.errors import InputError
 DYNAMICS, PROVIDER, OBSERVER = REGIONS = ("dynamics", "provider", "observer")
 LEASE = 1.0  # s without a sign of life after which a participant counts as lost
 
-# One runtime for everything: a third less time a round trip than zenoh's separate receive threads.
-os.environ.setdefault("ZENOH_RUNTIME", "(rx: (handover: app), acc: (handover: app), tx: (handover: app))")
+LARGEST_REQUEST = 65_536  # bytes of a control request; the answer may be as large as a model's memory
+
+# One runtime for accepting and receiving: less time a round trip than with zenoh's separate threads. Sending
+# has its own: what is passed on waits, in the thread that received it, until there is room to send it.
+os.environ.setdefault("ZENOH_RUNTIME", "(rx: (handover: app), acc: (handover: app))")
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,15 @@ def _open(
         "transport/unicast/open_timeout": int(LEASE * 1000),
         "transport/link/tx/lease": int(LEASE * 1000),
         "transport/link/tx/keep_alive": 4,
+        "low_pass_filter": [
+            {
+                "id": "requests",
+                "messages": ["query"],
+                "flows": ["ingress"],
+                "key_exprs": ["**"],
+                "size_limit": LARGEST_REQUEST,
+            }
+        ],
         **(security.settings() if security else {}),
     }
     try:
