@@ -173,7 +173,7 @@ class Multibody:
 
     def coordinates(self, state: Array) -> tuple[Array, Array]:
         """Return the joint coordinates, shape (nq,), and velocities, shape (nv,), of a state."""
-        return state[: self.nq], state[self.nq : -1]
+        return state[: self.nq], state[self.nq : self.nq + self.nv]
 
     def advance(
         self,
