@@ -195,3 +195,15 @@ def test_connect_and_weld_close_loops(tmp_path):
 def test_a_weld_keeps_the_start_at_zero(tmp_path):
     with pytest.raises(InputError, match=r"--at a=0\.1: expected no weld that closes a loop; got held\."):
         imported(tmp_path, LOOP, at=["a=0.1"])
+
+
+def test_stiff_joints_are_named(tmp_path):
+    """About 4e-5 kg·m² a damper relaxes in I/c, a spring in √(I/k)."""
+    joint = (
+        '<joint name="{}" axis="0 0 1" {}/><inertial pos="0 0 0" mass="0.1" diaginertia="4e-5 4e-5 4e-5"/>'
+    )
+    kinds = {"soft": 'damping="0.01"', "damped": 'damping="40"', "sprung": 'stiffness="4e9"'}
+    bodies = "".join(f"<body>{joint.format(name, values)}</body>" for name, values in kinds.items())
+    remarks = imported(tmp_path, f"<mujoco><worldbody>{bodies}</worldbody></mujoco>").remarks
+    stiff = [remark.item for remark in remarks if remark.what == "stiff joints"]
+    assert stiff == ["damped (relaxes in 1e-06 s)", "sprung (relaxes in 1e-07 s)"]

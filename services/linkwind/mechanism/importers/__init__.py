@@ -9,8 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from linkwind import __version__
 from linkwind.errors import InputError, SimulationError
 from linkwind.mechanism import build
@@ -18,6 +16,7 @@ from linkwind.mechanism.importers import mjcf, urdf, xmltree
 from linkwind.mechanism.importers.configuration import parse
 from linkwind.mechanism.importers.model import Model
 from linkwind.mechanism.importers.settle import settle
+from linkwind.mechanism.importers.stiffness import stiff_joints
 from linkwind.mechanism.importers.text import scenario_text
 from linkwind.mechanism.remarks import Remark
 from linkwind.native.multibody import Multibody
@@ -65,9 +64,10 @@ def import_file(
         raise InputError(
             f"--at {at[0]}: expected no weld that closes a loop; got {welds[0]}. Leave out --at."
         )
+    scenario = loads(scenario_text(model, path.name, __version__, start), str(path))
+    stiff = _stiff(scenario, path)
+    model.leave_out("stiff joints", "runs take very small steps; lower springs and dampers", stiff)
     text = scenario_text(model, path.name, __version__, start)
-    scenario = loads(text, str(path))
-    _refuse_singular(scenario, path)
     return Imported(model.kind, text, scenario, tuple(model.remarks))
 
 
@@ -84,11 +84,11 @@ def _read(path: Path, base: urdf.Base | None) -> Model:
     )
 
 
-def _refuse_singular(scenario: Scenario, path: Path) -> None:
-    """Find out before a run whether the mechanism can be moved at all."""
+def _stiff(scenario: Scenario, path: Path) -> list[str]:
+    """Find out before a run whether the mechanism can be moved, and in steps of which size."""
     mechanism = build(scenario)
-    multibody = Multibody(mechanism.tables, mechanism.bodies)
+    core = Multibody(mechanism.tables, mechanism.bodies, mechanism.closures)
     try:
-        multibody.evaluate(multibody.initial_state(mechanism.q0, mechanism.v0), np.zeros((multibody.n, 6)))
+        return list(stiff_joints(mechanism, core, scenario.coupling.step))
     except SimulationError as error:
         raise InputError(f"{path}: {error}") from None
