@@ -88,18 +88,21 @@ def _webp(quantity: Quantity, frame: FlowFrame, quality: int) -> str:
     return base64.b64encode(picture(quantity, frame, quality, effort=6)).decode("ascii")
 
 
-def picture(quantity: Quantity, frame: FlowFrame, quality: int, effort: int = 2) -> bytes:
+def picture(
+    quantity: Quantity, frame: FlowFrame, quality: int, *, cells: int = CELLS, effort: int = 2
+) -> bytes:
     """Return a frame as a grey WebP, the highest y at the top; what is no number is 0.
 
     Args:
         quantity: what of the frame.
         frame: of the fluid.
         quality: of the picture, 0 to 100.
+        cells: at most, along the longer side.
         effort: to make it small, 0 to 6.
     """
     from PIL import Image
 
-    stride = -(-max(frame.shape) // CELLS)
+    stride = -(-max(frame.shape) // cells)
     values = quantity.values(frame)[::stride, ::stride]
     share = np.nan_to_num((values - quantity.low) / (quantity.high - quantity.low))
     grey = np.round(np.clip(share, 0.0, 1.0) * GREY).astype(np.uint8)[::-1]

@@ -9,12 +9,14 @@ import numpy as np
 
 from linkwind.frames import FlowFrame
 from linkwind.log.contents import FLOW
+from linkwind.report.closeup import closeups
 from linkwind.report.film import Quantity, picture, quantities
 from linkwind.report.flow import survey
 from linkwind.view.recording import Recording
 
-SCALED_BY = 8  # frames that the scale is taken from, evenly spread
-QUALITY = 80
+SCALED_BY = 8  # frames that the scale is taken from, evenly spread, of what is around the mechanism
+QUALITY = 92
+CELLS = 800  # along the longer side of a picture
 
 
 class Film:
@@ -52,7 +54,9 @@ class Film:
             return
         self._counted = len(times)
         chosen = times[np.unique(np.linspace(0, len(times) - 1, SCALED_BY).astype(int))].tolist()
-        found = survey(self._provider, lambda: filter(None, map(self._frame, chosen)))
+        frames = [frame for frame in map(self._frame, chosen) if frame is not None]
+        near = closeups(self._recording.points(chosen), frames)
+        found = survey(self._provider, lambda: iter(near))
         if found is not None:
             self._quantities = quantities(found)
 
@@ -66,4 +70,4 @@ class Film:
             frame = self._frame(int(times[index])) if 0 <= index < len(times) else None
         if frame is None or name not in self._quantities:
             return None
-        return picture(self._quantities[name], frame, QUALITY), frame.extent
+        return picture(self._quantities[name], frame, QUALITY, cells=CELLS), frame.extent

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -132,6 +133,12 @@ class Recording:
         with self.lock:
             path = self._trajectory(round(low * 1e9), round(high * 1e9), TAIL)
             return scene(self._window(path)) if len(path.t) else None
+
+    def points(self, times_ns: Sequence[int]) -> Window:
+        """Return the states at some times [ns], those that there are."""
+        with self.lock:
+            found = [self.log.at(STATE, time_ns) for time_ns in times_ns]
+            return self._window(self._states([payload for payload in found if payload is not None]))
 
     def _run(self, low: int, high: int) -> tuple[Window, bool]:
         """Return a window [ns], and whether it has all states."""

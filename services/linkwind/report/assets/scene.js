@@ -4,6 +4,7 @@ import { bodyColour, theme } from "./charts.js";
 import { add, length, makeCamera, nice, number, turned } from "./motion.js";
 
 const GHOSTS = 8; // earlier poses left standing over a whole run
+const WAKE = 4; // sizes of the mechanism that are shown across a flow, and twice as many along it
 
 function arrow(pen, from, to, head) {
   const angle = Math.atan2(to[1] - from[1], to[0] - from[0]), size = Math.hypot(to[0] - from[0], to[1] - from[1]);
@@ -27,6 +28,7 @@ export function makeScene(canvas, motion, clock) {
   const extent = () => motion.world.high.map((x, k) => x - motion.world.low[k]);
   follow.checked = length(extent()) > 14 * motion.world.reach;
   const windSpeed = length(scene.wind);
+  const look = { zoom: 1, pan: [0, 0, 0] };
   let colour = theme(), film = null;
 
   function aim(now) {
@@ -34,12 +36,16 @@ export function makeScene(canvas, motion, clock) {
     const middle = world.low.map((x, k) => x + size[k] / 2);
     if (follow.checked) {
       camera.centre = motion.centre(now);
-      camera.scale = room / (2.7 * world.reach);
+      camera.scale = room / ((film ? WAKE : 2.7) * world.reach);
     } else {
-      camera.centre = middle;
-      const [w, h] = scene.planar ? size : [length(size), length(size)];
+      let [w, h] = scene.planar ? size : [length(size), length(size)];
+      const more = film ? Math.max(0, 2 * WAKE * world.reach - w) : 0; // of the wake, downstream
+      if (film) { w += more; h = Math.max(h, WAKE * world.reach); }
+      camera.centre = middle.map((x, k) => x + (windSpeed ? 0.3 * more * scene.wind[k] / windSpeed : 0));
       camera.scale = Math.min((camera.w - 60) / w, (camera.h - 110) / h);
     }
+    camera.scale *= look.zoom;
+    camera.centre = camera.centre.map((x, k) => x + look.pan[k]);
   }
 
   function grid() {
@@ -235,5 +241,5 @@ export function makeScene(canvas, motion, clock) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { colour = theme(); draw(); });
   resize();
   clock.listen(draw);
-  return { draw, set film(made) { film = made; } };
+  return { draw, look, camera, set film(made) { film = made; } };
 }

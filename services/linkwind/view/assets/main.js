@@ -5,6 +5,7 @@ import { unpack } from "/report/clock.js";
 import { makeFilm } from "/report/film.js";
 import { makeScene } from "/report/scene.js";
 import { makeClock } from "./clock.js";
+import { makeHand } from "./hand.js";
 import { makePlaybar } from "./playbar.js";
 import { makePoses } from "./poses.js";
 import { makeSpace } from "./space.js";
@@ -87,6 +88,7 @@ function show(window) {
     element("waiting").hidden = true;
     clock.series = series;
     const scene = flat ? makeScene(element("scene"), poses, clock) : makeSpace(element("space"), poses, clock);
+    if (flat) makeHand(element("scene"), scene);
     if (clock.live) element("follow").checked = true;
     view = { poses, scene, charts: makeCharts([], clock, element("charts"), zoomed), zoom: null };
   } else {

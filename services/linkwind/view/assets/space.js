@@ -97,7 +97,7 @@ export function makeSpace(host, motion, clock) {
       const tip = b * (SIDES + 1);
       return [tip, tip + 1 + s, tip + 1 + ((s + 1) % SIDES)];
     }));
-    const light = { ambient: 0.65, diffuse: 0.6, specular: 0.12, roughness: 0.8 };
+    const light = { ambient: 0.8, diffuse: 0.55, specular: 0.1, roughness: 0.9 };
     const made = bodies.flatMap(({ triangles }, b) => {
       const own = colour(bodyColour(b));
       return [
@@ -127,7 +127,7 @@ export function makeSpace(host, motion, clock) {
       uirevision: "kept", annotations: words(),
       scene: {
         aspectmode: "cube", dragmode: "orbit", xaxis: axis(x, "x [m]"), yaxis: axis(y, "y [m]"), zaxis: axis(z, "z [m]"),
-        camera: { up, eye: scene.up === "z" ? { x: 1.15, y: -1.35, z: 0.55 } : { x: 0.9, y: 0.6, z: 1.45 } },
+        camera: { up, eye: scene.up === "z" ? { x: 0.95, y: -1.1, z: 0.45 } : { x: 0.75, y: 0.5, z: 1.2 } },
       },
     };
   }
@@ -135,7 +135,7 @@ export function makeSpace(host, motion, clock) {
   function words() {
     const wind = length(scene.wind), text = wind ? [`wind ${number(wind)} m/s along (${scene.wind.map(number).join(", ")})`] : [];
     if (motion.largest) text.push(`longest arrow ${number(motion.largest)} N`);
-    return [{ text: text.join(" · "), x: 0.01, y: 0.01, xref: "paper", yref: "paper", xanchor: "left", yanchor: "bottom", showarrow: false }];
+    return [{ text: text.join(" · "), x: 0.01, y: 0.99, xref: "paper", yref: "paper", xanchor: "left", yanchor: "top", showarrow: false }];
   }
 
   async function paint() {
