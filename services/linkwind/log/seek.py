@@ -59,9 +59,14 @@ class SeekableLog(Head):
 
     def extent(self, topic: str) -> tuple[int, int] | None:
         """Return the first and the last time of a topic's messages [ns]; None without any."""
-        holding = list(self._holding(topic, *EVER))
-        ends = [self._index.entries(*holding[i])[i, 0] for i in (0, -1)] if holding else []
-        return (int(ends[0]), int(ends[1])) if ends else None
+        channel = self._number(topic)
+        if channel is None:
+            return None
+        chunks = self._index.chunks
+        first = next(chunk for chunk in chunks if channel in chunk.indexes)
+        last = next(chunk for chunk in reversed(chunks) if channel in chunk.indexes)
+        begins, ends = (self._index.entries(chunk, channel)[:, 0] for chunk in (first, last))
+        return int(begins[0]), int(ends[-1])
 
     def times(self, topic: str) -> Times:
         """Return the times [ns] of all messages of a topic, shape (k,); for one that has few."""

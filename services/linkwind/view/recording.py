@@ -22,7 +22,7 @@ from linkwind.report.panels import panels
 from linkwind.report.scene import scene
 from linkwind.spatial import Array
 
-WHOLE = 64e6  # bytes that are read for all states of a window; of a larger one a sample is shown
+WHOLE = 20_000, 1e9  # states, and bytes of the log around them, up to which all are shown; else a sample
 SAMPLES = 1200  # states of that sample
 TAIL = 60  # states that are told of a run between two looks at it
 
@@ -143,7 +143,8 @@ class Recording:
     def _run(self, low: int, high: int) -> tuple[Window, bool]:
         """Return a window [ns], and whether it has all states."""
         topics = (STATE, STEP, *(WRENCH + name for name in self.log.diagnostics))
-        whole = self.log.bytes_between(low, high) <= WHOLE
+        states, size = WHOLE
+        whole = (high - low) <= states * self.step_ns and self.log.bytes_between(low, high) <= size
         found = self.log.between(topics, low, high) if whole else self.log.sampled(topics, low, high, SAMPLES)
         window = self._window(self._states(found[STATE]))
         if not found[STEP]:
@@ -193,12 +194,12 @@ class Recording:
             extrapolation_error=np.empty((0, 0)),
             interface_energy=np.empty(0),
             exchange=np.empty(0),
-            flat=self._flat,
+            flat=self.flat,
             balance=self._balance or 0.0,
         )
 
     @property
-    def _flat(self) -> bool:
+    def flat(self) -> bool:
         """Whether the mechanism is planar, or turned out to stay in a plane in a run that is over."""
         return self._stated_flat or (self.log.ended and self._stayed_flat)
 

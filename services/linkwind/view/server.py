@@ -30,7 +30,7 @@ from linkwind.view.console import Console
 from linkwind.view.film import Film
 from linkwind.view.recording import Recording
 
-LOOK = 0.1  # s between two looks at a log that grows
+LOOK, SELDOM = 0.1, 0.5  # s between two looks at a log that grows, and at one that does not
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 POLICY = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' blob: data:"
 
@@ -132,7 +132,7 @@ class Pages:
                         poses = await run_in_threadpool(self._recording.poses, after, last)
                     yield f"data: {json.dumps(now | {'poses': poses})}\n\n"
                     before = now
-                await asyncio.sleep(LOOK)
+                await asyncio.sleep(SELDOM if now["ended"] else LOOK)
         finally:
             if self._console is not None:
                 self._console.leave()
