@@ -103,7 +103,16 @@ static void equations(const lw_multibody *mb, const lw_constraint *c, lw_constra
         keep_square(row++, &a, &b, axis(&a.frame, pair[k][0]), axis(&b.frame, pair[k][1]));
 }
 
+/* A row that asks for nothing. */
+static void let_go(lw_constraint_row *r) {
+    r->on[0].linear = r->on[0].angular = r->on[1].linear = r->on[1].angular = zero;
+    r->value = r->rate = r->drift = 0.0;
+}
+
 void lw_constraint_equations(lw_maximal *m, const lw_multibody *mb) {
-    for (int32_t i = 0; i < m->constraints; ++i)
-        equations(mb, &m->constraint[i], m->row + m->constraint[i].row);
+    for (int32_t i = 0; i < m->constraints; ++i) {
+        const lw_constraint *c = &m->constraint[i];
+        if (lw_constraint_acts(m, c)) equations(mb, c, m->row + c->row);
+        else for (int32_t r = c->row; r < c->row + c->rows; ++r) let_go(&m->row[r]);
+    }
 }

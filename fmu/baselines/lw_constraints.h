@@ -59,6 +59,14 @@ LW_INLINE lw_spatial lw_spatial_times(const lw_inertia6 *i, lw_spatial a) {
     return f;
 }
 
+/* lw_maximal.c: let the tree's joints be what the events of the bodies have made of them. */
+void lw_maximal_follow(lw_maximal *maximal, const lw_multibody *bodies);
+/* Does a joint act, or has it been released? */
+LW_INLINE int lw_constraint_acts(const lw_maximal *m, const lw_constraint *c) {
+    if (!c->carries) return !m->tree->closure[c->item].released;
+    return m->tree->link[c->link[1]].type == m->tree->link[c->link[1]].built;
+}
+
 /* lw_constraints.c: what a joint type keeps; all rows, after lw_kinematics. */
 int32_t lw_constraint_kept(int joint_type);
 int32_t lw_constraint_count(int32_t kept);

@@ -49,6 +49,8 @@ void lw_envelope_assemble(lw_maximal *m) {
             for (int32_t t = link < 0 ? 0 : m->touching[link]; t < (link < 0 ? 0 : m->touching[link + 1]); ++t)
                 if (m->touch[t] / 2 <= i) meet(m, c, side, &m->constraint[m->touch[t] / 2], m->touch[t] % 2);
         }
+        for (int32_t k = c->row; k < c->row + c->rows && !lw_constraint_acts(m, c); ++k)
+            m->matrix[m->row[k].start + (size_t)k] = 1.0; /* a multiplier of zero */
     }
 }
 

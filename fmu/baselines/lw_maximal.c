@@ -8,6 +8,11 @@
 static const lw_spatial none = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
 static const lw_inertia6 no_inertia;
 
+void lw_maximal_follow(lw_maximal *m, const lw_multibody *mb) {
+    size_t bytes = (size_t)mb->events * sizeof(double);
+    if (memcmp(m->tree->happened, mb->happened, bytes)) lw_modes(m->tree, mb->happened);
+}
+
 /* ---- accelerations ---- */
 
 static lw_spatial own_force(const lw_multibody *mb, const lw_link *l, const double *wrench) {
@@ -61,6 +66,7 @@ static void set_reactions(const lw_maximal *m, lw_multibody *mb) {
 static int accelerations(lw_multibody *mb, const double *q, const double *v, const double *wrench,
                          double *joint_acceleration, lw_fault *fault) {
     lw_maximal *m = (lw_maximal *)mb->formulation;
+    lw_maximal_follow(m, mb);
     lw_kinematics(mb, q, v);
     int status = lw_inverse_inertias(m, mb, fault);
     if (status) return status;
@@ -88,6 +94,7 @@ static int accelerations(lw_multibody *mb, const double *q, const double *v, con
 
 static double spring_energy(const lw_multibody *mb, const double *q) {
     lw_maximal *m = (lw_maximal *)mb->formulation;
+    lw_maximal_follow(m, mb);
     lw_joint_coordinates(m, mb, q);
     return lw_spring_energy(m->tree, m->q);
 }
@@ -232,6 +239,7 @@ void lw_maximal_closure_reactions(const lw_multibody *bodies, double *reaction) 
 void lw_maximal_start(lw_multibody *bodies, const double *tree_state, double *state) {
     const lw_maximal *m = (const lw_maximal *)bodies->formulation;
     lw_multibody *tree = m->tree;
+    lw_modes(tree, tree_state + tree->nq + tree->nv + 1);
     lw_kinematics(tree, tree_state, tree_state + tree->nq);
     for (int32_t i = 0; i < m->n; ++i) {
         const lw_link *from = &tree->link[i], *to = &bodies->link[i];
@@ -242,11 +250,15 @@ void lw_maximal_start(lw_multibody *bodies, const double *tree_state, double *st
         lw_store3(v + 3, lw_mat_tvec(from->rotation, from->velocity.angular));
         if (m->turn[i] >= 0) state[m->turn[i]] = tree_state[from->q + (from->type == LW_PLANAR ? 2 : 0)];
     }
-    state[bodies->nq + bodies->nv] = 0.0;
+    int memory = bodies->nq + bodies->nv, tree_memory = tree->nq + tree->nv;
+    state[memory] = 0.0;
+    memcpy(state + memory + 1, tree_state + tree_memory + 1, (size_t)tree->events * sizeof(double));
 }
 
 void lw_maximal_coordinates(lw_multibody *bodies, const double *state, double *q, double *v) {
     lw_maximal *m = (lw_maximal *)bodies->formulation;
+    lw_modes(bodies, state + bodies->nq + bodies->nv + 1);
+    lw_maximal_follow(m, bodies);
     lw_kinematics(bodies, state, state + bodies->nq);
     lw_joint_coordinates(m, bodies, state);
     memcpy(q, m->q, (size_t)m->tree->nq * sizeof(double));

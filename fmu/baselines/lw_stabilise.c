@@ -90,6 +90,7 @@ static int project(lw_maximal *m, lw_multibody *mb, double *q, double *v, lw_fau
 
 int lw_maximal_settle(lw_multibody *mb, double *q, double *v, lw_fault *fault) {
     lw_maximal *m = (lw_maximal *)mb->formulation;
+    lw_maximal_follow(m, mb);
     if (m->stabilisation == LW_PROJECTION && m->rows) {
         int status = project(m, mb, q, v, fault);
         if (status) return status;
@@ -99,7 +100,8 @@ int lw_maximal_settle(lw_multibody *mb, double *q, double *v, lw_fault *fault) {
     lw_joint_coordinates(m, mb, q);
     for (int32_t i = 0; i < m->n; ++i) {
         const lw_link *joint = &m->tree->link[i];
-        if (m->turn[i] >= 0) q[m->turn[i]] = m->q[joint->q + (joint->type == LW_PLANAR ? 2 : 0)];
+        if (m->turn[i] >= 0 && joint->type == joint->built)
+            q[m->turn[i]] = m->q[joint->q + (joint->type == LW_PLANAR ? 2 : 0)];
     }
     return LW_OK;
 }

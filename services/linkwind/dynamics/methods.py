@@ -22,11 +22,6 @@ def multibody(mechanism: Mechanism, scenario: Scenario) -> Multibody:
         MechanismError: the method cannot do this mechanism.
     """
     dynamics, parts = scenario.dynamics, (mechanism.tables, mechanism.bodies, mechanism.closures)
-    if len(mechanism.tables.event_joint) and dynamics.method != "reduced":
-        raise MechanismError(
-            f"{scenario.source}: dynamics.method: expected reduced, because joints are released, locked or "
-            f"stopped; got {dynamics.method}. Use reduced."
-        )
     try:
         if dynamics.method == "cfe":
             stabilisation = Stabilisation[dynamics.stabilisation.upper()]

@@ -12,8 +12,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from linkwind.errors import MechanismError
 from linkwind.native.library import declare
-from linkwind.native.multibody import JOINT_TYPES, Evaluation, Multibody, Tables
+from linkwind.native.multibody import ACTIONS, JOINT_TYPES, OCCASIONS, Evaluation, Multibody, Tables
 from linkwind.spatial import Array, Motion, address
 
 _pointer = ctypes.c_void_p
@@ -38,7 +39,7 @@ class Cfe(Multibody):
 
     A state is position and orientation of each body, then the angle of each revolute and planar joint, which
     the poses tell up to whole turns; then velocity, in W, and angular velocity, in the body's frame, of each
-    body; then the integrator's memory. ``nq`` and ``nv`` are those of the state.
+    body; then the integrator's memory, and when events happened. ``nq`` and ``nv`` are those of the state.
     """
 
     def __init__(
@@ -46,6 +47,7 @@ class Cfe(Multibody):
         tables: Tables,
         bodies: Sequence[str] = (),
         closures: Sequence[str] = (),
+        events: Sequence[str] = (),
         *,
         stabilisation: Stabilisation,
         time: float,
@@ -56,13 +58,16 @@ class Cfe(Multibody):
             tables: the mechanism, as for ``Multibody``; every body needs mass and inertia, or added inertia.
             bodies: names of the bodies, for errors; their numbers if not given.
             closures: likewise of the joints that close loops.
+            events: likewise of what may happen.
             stabilisation: of the joints.
             time: in which Baumgarte's method undoes what a joint is open [s]: it goes back as exp(-t/time).
 
         Raises:
-            MechanismError: a table has a wrong shape or a wrong value.
+            MechanismError: a table has a wrong shape or a wrong value, or an event is none that this method
+                knows: release of a joint that carries a body, on command, at a time, on a force or torque.
         """
-        self.tree = Multibody(tables, bodies, closures)
+        self.tree = Multibody(tables, bodies, closures, events)
+        _check_events(self.tree)
         super().__init__(_free(tables))
         self._names = self.tree._names
         self._joints = np.zeros((_size(self.tree._model) + 7) // 8)
@@ -94,6 +99,16 @@ class Cfe(Multibody):
         return self.tree.joint_gap(motion)
 
 
+def _check_events(tree: Multibody) -> None:
+    t, occasions = tree.tables, [OCCASIONS[name] for name in ("command", "time", "force", "torque")]
+    carries = (t.event_joint < tree.n) & (t.event_action == ACTIONS["release"])
+    for i in np.flatnonzero(~(carries & np.isin(t.event_occasion, occasions))):
+        raise MechanismError(
+            f"event {tree._names[2][i]}: expected the release of a joint that carries a body, on command, at "
+            "a time, on a force or a torque, which is all that method cfe knows; got another. Use reduced."
+        )
+
+
 def _free(tables: Tables) -> Tables:
     """Return the tables of the same bodies without their joints, and with room for the joints' angles."""
     n = len(tables.parent)
@@ -114,5 +129,11 @@ def _free(tables: Tables) -> Tables:
         gravity=tables.gravity,
         stiffness=np.zeros(6 * n),
         damping=np.zeros(6 * n),
+        event_joint=tables.event_joint,
+        event_action=tables.event_action,
+        event_occasion=tables.event_occasion,
+        event_side=tables.event_side,
+        event_threshold=tables.event_threshold,
+        event_restitution=tables.event_restitution,
         rest=np.concatenate([np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], n), np.zeros(angles)]),
     )

@@ -44,6 +44,11 @@ class Incremental(Multibody):
                 f"joint {self._names[1][0]}: expected no loop, which the method incremental does not have; "
                 "got one that this joint closes. Use reduced or cfe."
             )
+        if self.events:
+            raise MechanismError(
+                "events: expected none, for the method incremental releases and locks nothing; got "
+                f"{self.events}. Use reduced or cfe."
+            )
         self._equations = np.zeros((_size(self._model) + 7) // 8)
         body = _attach(address(self._equations), self._model)
         if body >= 0:
