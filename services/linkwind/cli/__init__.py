@@ -8,6 +8,7 @@ import typer
 
 from linkwind.cli import (
     certs,
+    doctor,
     fmu,
     logs,
     mechanism,
@@ -45,6 +46,7 @@ fmu.register(app)
 mechanism.register(app)
 validate.register(app)
 certs.register(app)
+doctor.register(app)
 router.register(app)
 
 

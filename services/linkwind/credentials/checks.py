@@ -10,7 +10,7 @@ from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives import serialization
 from cryptography.x509.oid import NameOID
 
-from linkwind.credentials.identity import CA, Identity
+from linkwind.credentials.identity import CA, CERTIFICATE, Identity
 from linkwind.errors import CertificateError
 
 
@@ -28,10 +28,10 @@ def load_identity(folder: Path, role: str) -> Identity:
     home = folder / role if (folder / role).is_dir() else folder
     identity = Identity(role, home.resolve())
     certificate = _certificate(identity.certificate)
-    name = certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
-    if not name or name[0].value != role:
-        got = f'that of "{name[0].value!s}"' if name else "one without a name"
-        raise CertificateError(f'--tls {folder}: expected the certificate of "{role}"; got {got}')
+    if _name(certificate) != role:
+        raise CertificateError(
+            f'--tls {folder}: expected the certificate of "{role}"; got that of "{_name(certificate)}"'
+        )
     now = datetime.datetime.now(datetime.UTC)
     begin, end = certificate.not_valid_before_utc, certificate.not_valid_after_utc
     if not begin <= now <= end:
@@ -48,6 +48,26 @@ def load_identity(folder: Path, role: str) -> Identity:
         ) from error
     _check_key(identity.key, certificate)
     return identity
+
+
+def role_in(folder: Path) -> str:
+    """Return the name in the certificate of a folder.
+
+    Raises:
+        CertificateError: there is no certificate.
+    """
+    return _name(_certificate(folder / CERTIFICATE))
+
+
+def days_left(identity: Identity) -> float:
+    """Return for how many days a certificate is valid still."""
+    end = _certificate(identity.certificate).not_valid_after_utc
+    return (end - datetime.datetime.now(datetime.UTC)).total_seconds() / 86400
+
+
+def _name(certificate: x509.Certificate) -> str:
+    names = certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
+    return str(names[0].value) if names else ""
 
 
 def _read(path: Path) -> bytes:

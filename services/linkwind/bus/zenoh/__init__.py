@@ -4,6 +4,7 @@ Publishers and subscribers carry the lock step, a queryable the control requests
 who is there. Multicast, gossip and shared memory are off: endpoints are explicit, messages small.
 """
 
+from linkwind.bus.zenoh.diagnosis import check_trust
 from linkwind.bus.zenoh.dynamics import SPIN, ZenohDynamicsLink
 from linkwind.bus.zenoh.player import ZenohPlayer
 from linkwind.bus.zenoh.provider import ZenohProviderLink
@@ -18,6 +19,7 @@ __all__ = [
     "ZenohPlayer",
     "ZenohProviderLink",
     "ZenohRouter",
+    "check_trust",
     "loopback_endpoint",
     "open_session",
 ]
