@@ -21,9 +21,24 @@ ADDED_INERTIA = np.pi / 128.0
 
 
 def normal(short: bool) -> Findings:
-    """Mean drag and Strouhal number of a plate normal to a stream, Re 100."""
+    """Mean drag and Strouhal number of a plate normal to a stream, Re 100; on a coarser grid as well."""
     del short
-    cells, end, window = 32, 90.0, (36.0, 30.0)
+    found, case = Findings(), "plate normal to the stream, Re 100"
+    for cells, within in ((32, 0.05), (24, None)):
+        drag, beat, curve = _street(cells, 90.0, (36.0, 30.0))
+        which = case if within else f"{case}, {cells} cells"
+        found.rows.append(Row(which, "mean drag coefficient", drag, 2.42, within, GOKTEPELI))
+        found.rows.append(Row(which, "Strouhal number", beat, 0.181, within, GOKTEPELI))
+        if within:
+            level = Curve("Göktepeli 2025: mean", np.array([90.0]), np.array([2.42]), True)
+            found.plots.append(
+                Plot("Plate normal to the stream, Re 100", "t U/c", "coefficient", (curve, level))
+            )
+    return found
+
+
+def _street(cells: int, end: float, window: tuple[float, float]) -> tuple[float, float, Curve]:
+    """Return mean drag coefficient and Strouhal number of the last 40 lengths, and the drag over time."""
     text = scene(
         PLATE,
         cells=cells,
@@ -38,19 +53,10 @@ def normal(short: bool) -> Findings:
     t = forces.t[forces.t > end - 40.0]
     force = 2.0 * forces.wrench[-len(t) :, 0]
     first, last, _ = whole_periods(t, force[:, 1])
-    mean = float(between(t, force[:, 0], first, last).mean())
-    case = "plate normal to the stream, Re 100"
     # A plate without thickness has no force along itself: its street is seen in the torque.
     beat = frequency(t, forces.wrench[-len(t) :, 0, 2])
-    rows = [
-        Row(case, "mean drag coefficient", mean, 2.42, 0.05, GOKTEPELI),
-        Row(case, "Strouhal number", beat, 0.181, 0.05, GOKTEPELI),
-    ]
-    curves = (
-        Curve("drag", forces.t, 2.0 * forces.wrench[:, 0, 0]),
-        Curve("Göktepeli 2025: mean", np.array([end]), np.array([2.42]), True),
-    )
-    return Findings(rows, [Plot("Plate normal to the stream, Re 100", "t U/c", "coefficient", curves)])
+    mean = float(between(t, force[:, 0], first, last).mean())
+    return mean, beat, Curve("drag", forces.t, 2.0 * forces.wrench[:, 0, 0])
 
 
 def _kicked(aside: float) -> Path:
