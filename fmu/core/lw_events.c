@@ -44,6 +44,8 @@ static void set_mode(lw_link *l, int released, int locked) {
     l->translations = lw_joint_translations(l->type);
     l->freedoms = lw_joint_nv(l->type);
     l->columns = locked ? 0 : l->freedoms;
+    l->sprung = !released && l->built_sprung;
+    l->damped = !released && l->built_damped;
 }
 
 void lw_modes(lw_multibody *mb, const double *happened) {

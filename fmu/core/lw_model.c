@@ -111,6 +111,8 @@ static void build_link(lw_link *l, const lw_tables *t, int i) {
     l->translations = lw_joint_translations(l->type);
     l->sprung = any_nonzero(t->stiffness + l->v, l->columns);
     l->damped = any_nonzero(t->damping + l->v, l->columns);
+    l->built_sprung = l->sprung;
+    l->built_damped = l->damped;
     l->mass = t->mass[i];
     l->inertia = lw_load_sym(t->inertia + 6 * i);
     build_frames(l, t, i);

@@ -25,7 +25,7 @@ typedef struct {
     int32_t body, parent; /* row of the tables; link of the parent, -1 = world */
     int32_t type, q, v, translations;
     int32_t freedoms, columns; /* of the type; of them those that are not locked */
-    int32_t built;             /* type that it had at first */
+    int32_t built, built_sprung, built_damped; /* as at first */
     int32_t parent_rotated, child_rotated, sprung, damped;
     lw_vec3 parent_point, child_point, axis; /* axis: the joint's z in the parent's body frame */
     lw_quat parent_quat, child_quat_inverse;

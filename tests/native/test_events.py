@@ -82,6 +82,19 @@ def test_momentum_and_motion_go_on_through_a_release(joint, seed):
     assert still[-1][-1] == NOT_YET
 
 
+def test_the_spring_of_a_released_joint_is_gone_with_its_energy():
+    body = Body(-1, "prismatic", 2.0, 0.1 * np.eye(3), stiffness=50.0, damping=0.3)
+    multibody = eventful([body], [Event(0, occasion="position", threshold=0.0, side=-1)], gravity=(0, 0, 0))
+    start = multibody.initial_state(np.r_[0.1, np.zeros(6)], np.zeros(6))
+    held = eventful([body], [Event(0, occasion="position", threshold=0.06, side=-1)], gravity=(0, 0, 0))
+    for mechanism, left in ((multibody, 0.0), (held, 0.06)):
+        states, works = fly(mechanism, start, 1e-3, 600)
+        energies = [sum(mechanism.energy(s)) for s in (states[0], states[-1])]
+        assert works[-1][1] == pytest.approx(energies[0] - energies[1], abs=1e-10)
+        assert np.ptp(states[-200:, 9]) < 1e-14  # it flies on
+        assert works[-1][1] > 0.5 * 50.0 * left**2
+
+
 def test_a_release_on_a_force():
     """A pendulum let go from the horizontal pulls with 3 m g sin(angle): at 2 m g the sine is 2/3."""
     bodies = [Body(-1, "revolute", 1.5, POINT, (0, 0, 0), (-2.0, 0, 0))]

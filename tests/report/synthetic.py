@@ -134,6 +134,7 @@ def planar(steps=1200, **changes) -> Run:
         dissipated_work=np.zeros(k),
         joint_gap=np.abs(random.normal(0, 2e-16, k)),
         closure_reaction=np.zeros((k, 0, 6)),
+        event_time=np.zeros((k, 0)),
     )
     errors = 10.0 ** random.normal([0, -1, -2, -2.5], 0.4, (k, 4))
     return run_of(scenario(**changes), path, errors)
@@ -222,5 +223,6 @@ def flapper(steps=800) -> Run:
         dissipated_work=np.zeros(k),
         joint_gap=np.full(k, 1e-16),
         closure_reaction=np.zeros((k, 0, 6)),
+        event_time=np.zeros((k, 0)),
     )
     return run_of(description, path, np.full((k, 4), np.nan))

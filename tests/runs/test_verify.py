@@ -109,7 +109,12 @@ def test_one_bit_of_any_field_is_found_and_named(
 
 def test_fields_above_are_all_fields(log: Path) -> None:
     for topic, fields in FIELDS.items():
-        columns = set(open_log(log).columns(topic)) - {"response", "diagnostics", "closure_reaction"}
+        columns = set(open_log(log).columns(topic)) - {
+            "response",
+            "diagnostics",
+            "closure_reaction",
+            "event_time",
+        }
         assert columns <= set(fields)
         assert set(fields) - columns <= {"run", "provider", "kind"}
 

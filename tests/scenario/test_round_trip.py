@@ -132,6 +132,7 @@ def test_builtin_names():
     assert builtin_names() == [
         "cylinder",
         "falling_plate",
+        "stage_separation",
         "two_link",
         "two_link_field",
         "two_link_flow",

@@ -125,6 +125,10 @@ def behind_a_bar(name: str, steps: int, job: Callable[[Progress], T]) -> T:
     return outcome
 
 
+def _happened(at: float | None) -> str:
+    return "did not happen" if at is None else f"at {at:.9g} s"
+
+
 def print_summary(outcome: Outcome) -> None:
     """Print what a run came to."""
     summary = outcome.as_json()
@@ -135,6 +139,7 @@ def print_summary(outcome: Outcome) -> None:
         "exchange time": f"{exchange['median']:.0f} µs median, {exchange['p99']:.0f} µs p99",
         "largest joint gap": "no joints" if gap is None else f"{gap:.2g} m",
         "largest aerodynamic force": f"{summary['force_max_N']:.4g} N",
+        **{name: _happened(at) for name, at in summary["events"].items()},
         "log": summary["log"],
         "report": outcome.report_trouble or summary["report"],
     }

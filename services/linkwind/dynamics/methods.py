@@ -31,4 +31,4 @@ def multibody(mechanism: Mechanism, scenario: Scenario) -> Multibody:
             return Incremental(*parts)
     except MechanismError as error:
         raise MechanismError(f"{scenario.source}: dynamics.method: {error}") from error
-    return Multibody(*parts)
+    return Multibody(*parts, mechanism.events)

@@ -20,11 +20,13 @@ class State(NamedTuple):
     """A mechanism at a communication point.
 
     Attributes:
-        values: coordinates, velocities and the integrator's memory, shape (state_size,).
+        step: index of the communication point.
+        values: coordinates, velocities, the integrator's memory and times of events, shape (state_size,).
         external_work: done by the fluid since t_0 [J].
         dissipated_work: taken by joint dampers since t_0 [J].
     """
 
+    step: int
     values: Array
     external_work: float
     dissipated_work: float
@@ -36,9 +38,10 @@ class MechanismPlant:
     def __init__(self, mechanism: Mechanism, scenario: Scenario, where: Callable[[], str]) -> None:
         """Make the plant of ``scenario``; ``where`` tells the step and time of an error."""
         self._where = where
-        self._step = scenario.coupling.step_ns / 1e9
+        self._step_ns = scenario.coupling.step_ns
+        self._step = self._step_ns / 1e9
         self.change(mechanism, scenario)
-        self.initial = State(self.multibody.initial_state(mechanism.q0, mechanism.v0), 0.0, 0.0)
+        self.initial = State(0, self.multibody.initial_state(mechanism.q0, mechanism.v0), 0.0, 0.0)
         self._motion = Motion.at_rest(self.multibody.n)
 
     def change(self, mechanism: Mechanism, scenario: Scenario) -> None:
@@ -56,7 +59,13 @@ class MechanismPlant:
         """Return the state one macro step later; see :class:`linkwind.coupling.Plant`."""
         try:
             values, work = self.multibody.advance(
-                state.values, self._step, nodes, wrenches, added_inertia, **self._how
+                state.values,
+                self._step,
+                nodes,
+                wrenches,
+                added_inertia,
+                time=self._time(state),
+                **self._how,
             )
         except SimulationError as error:
             raise self._located(error) from error
@@ -74,7 +83,15 @@ class MechanismPlant:
         """Advance under an affine wrench; see :class:`linkwind.coupling.Plant`."""
         try:
             values, work, affine = self.multibody.advance_affine(
-                state.values, self._step, nodes, wrenches, added_inertia, response, about, **self._how
+                state.values,
+                self._step,
+                nodes,
+                wrenches,
+                added_inertia,
+                response,
+                about,
+                time=self._time(state),
+                **self._how,
             )
         except SimulationError as error:
             raise self._located(error) from error
@@ -91,13 +108,17 @@ class MechanismPlant:
         """Return what a response amounts to as inertia; see :class:`linkwind.coupling.Plant`."""
         return self.multibody.affine_inertia(state.values, added_inertia, response, self._step)
 
+    def _time(self, state: State) -> float:
+        """Return the simulation time at a state [s]: a multiple of the step, never a sum."""
+        return state.step * self._step_ns / 1e9
+
     def _located(self, error: SimulationError) -> SimulationError:
         return SimulationError(f"dynamics: after the exchange of {self._where()}: {error}")
 
 
 def _later(state: State, values: Array, work: Array) -> State:
     external, dissipated = work.tolist()
-    return State(values, state.external_work + external, state.dissipated_work + dissipated)
+    return State(state.step + 1, values, state.external_work + external, state.dissipated_work + dissipated)
 
 
 def acceleration_weight(mechanism: Mechanism) -> Array:

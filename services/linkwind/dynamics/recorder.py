@@ -50,8 +50,11 @@ class Recorder:
         self.force_max = 0.0
         self.log = log
         self.multibody = multibody
+        self._events = len(mechanism.events)
         self._step_ns = scenario.coupling.step_ns
-        self._state = StateEncoder(n, len(mechanism.q0), len(mechanism.v0), len(mechanism.closures))
+        self._state = StateEncoder(
+            n, len(mechanism.q0), len(mechanism.v0), len(mechanism.closures), len(mechanism.events)
+        )
         self._step = StepEncoder(scenario.coupling.order)
         self._accepted, self._accepted_twist = _motion_and_twist(n)
         self._trial, self._trial_twist = _motion_and_twist(n)
@@ -85,6 +88,7 @@ class Recorder:
             dissipated_work=point.state.dissipated_work,
             joint_gap=gap,
             closure_reaction=result.closure_reaction,
+            event_time=values[len(values) - self._events :],
         )
         self.log.state(payload, time_ns)
         self._coupling(point, time_ns)

@@ -35,6 +35,7 @@ class Result:
         exchange_us: wall clock of the exchanges, from posting to the last answer.
         joint_gap_max_m: largest distance of two joint points, from the poses; None without joints [m].
         force_max_N: largest aerodynamic force on a body [N].
+        events: when each event happened [s]; None: it did not.
         final_state_sha256: of the last accepted poses and twists, little-endian float64, body by body.
     """
 
@@ -44,6 +45,7 @@ class Result:
     exchange_us: ExchangeTimes
     joint_gap_max_m: float | None
     force_max_N: float  # noqa: N815  the unit's symbol
+    events: dict[str, float | None]
     final_state_sha256: str
 
 
@@ -129,8 +131,15 @@ class DynamicsService:
             exchange_us=self._times,
             joint_gap_max_m=recorder.joint_gap_max if self.mechanism.has_joints else None,
             force_max_N=recorder.force_max,
+            events=self._happened(final),
             final_state_sha256=digest(self.session.motion.accepted),
         )
+
+    def _happened(self, final: State) -> dict[str, float | None]:
+        """Return when each event of the scenario happened [s], without the stops."""
+        times = final.values[len(final.values) - self.multibody.events :].tolist()
+        names = [event.name for event in self.scenario.events]
+        return {name: at if at >= 0.0 else None for name, at in zip(names, times, strict=False)}
 
     def _march(self, progress: Callable[[int], None]) -> State:
         """Let the coupling scheme do every step; return the last state."""

@@ -107,7 +107,7 @@ def _inputs(mechanism: Mechanism) -> Iterator[Variable]:
 def _states(piece: Piece, state: Array, nq: int) -> Iterator[Variable]:
     for what, section, first, count, start in (
         ("q", "Q", piece.q, piece.nq, state[:nq]),
-        ("v", "V", piece.v, piece.nv, state[nq:-1]),
+        ("v", "V", piece.v, piece.nv, state[nq:]),
     ):
         name = piece.called(what)
         meaning = "Coordinates" if what == "q" else "Velocities"

@@ -27,9 +27,10 @@ class StateEncoder:
         nq: number of joint coordinates.
         nv: number of joint velocities.
         closures: number of joints that close loops.
+        events: number of things that may happen to joints.
     """
 
-    def __init__(self, n: int, nq: int, nv: int, closures: int = 0) -> None:
+    def __init__(self, n: int, nq: int, nv: int, closures: int = 0, events: int = 0) -> None:
         six = [0.0] * (6 * n)
         motion = {"position": six[: 3 * n], "orientation": six[: 4 * n]}
         motion |= {"linear": six[: 3 * n], "angular": six[: 3 * n]}
@@ -38,6 +39,7 @@ class StateEncoder:
             MESSAGES["State"](
                 step=0, time_ns=0, motion=motion, q=[0.0] * nq, v=[0.0] * nv,
                 acceleration=six, reaction=six, wrench=six, closure_reaction=[0.0] * (6 * closures),
+                event_time=[0.0] * events,
                 **dict.fromkeys(scalars, 0.0),
             )
         )  # fmt: skip
@@ -52,6 +54,7 @@ class StateEncoder:
         self._reaction = views["reaction"].reshape(n, 6)
         self._wrench = views["wrench"].reshape(n, 6)
         self._closure_reaction = views["closure_reaction"].reshape(closures, 6)
+        self._event_time = views["event_time"]
         self._energies = self._layout.regions["kinetic_energy"].offset
 
     def encode(
@@ -71,6 +74,7 @@ class StateEncoder:
         dissipated_work: float,
         joint_gap: float,
         closure_reaction: Array | None = None,
+        event_time: Array | None = None,
     ) -> bytes:
         """Return the State at one communication point.
 
@@ -90,6 +94,7 @@ class StateEncoder:
             dissipated_work: taken by joint dampers since t_0 [J].
             joint_gap: largest distance of two joint points, from the poses [m].
             closure_reaction: of the joints that close loops, as ``reaction``, shape (closures, 6).
+            event_time: when each event happened [s], -1 for not yet, shape (events,).
         """
         self._step[0] = step
         self._time_ns[0] = time_ns
@@ -103,6 +108,8 @@ class StateEncoder:
         self._wrench[...] = wrench
         if closure_reaction is not None:
             self._closure_reaction[...] = closure_reaction
+        if event_time is not None:
+            self._event_time[...] = event_time
         ENERGIES.pack_into(
             self._layout.buffer, self._energies, kinetic_energy,
             0x51, potential_energy, 0x59, external_work, 0x61, dissipated_work, 0x69, joint_gap,

@@ -44,6 +44,7 @@ class Trajectory(NamedTuple):
         joint_gap: largest distance of two joint points, from the poses [m], shape (k,).
         closure_reaction: of each of c joints that close loops, parent on child [N, N·m], shape (k, c, 6),
             force first, in W at the joint's point on the child.
+        event_time: when each of e events had happened [s], -1 for not yet, shape (k, e).
     """
 
     step: Index
@@ -63,6 +64,7 @@ class Trajectory(NamedTuple):
     dissipated_work: Array
     joint_gap: Array
     closure_reaction: Array
+    event_time: Array
 
 
 class Steps(NamedTuple):
@@ -143,19 +145,20 @@ def trajectory(state: dict[str, NDArray[Any]]) -> Trajectory:
 
     scalars = ("kinetic_energy", "potential_energy", "external_work", "dissipated_work", "joint_gap")
     return Trajectory(
-        state["step"][:, 0],
-        seconds(state["time_ns"][:, 0]),
-        bodies("motion.position", 3),
-        bodies("motion.orientation", 4),
-        bodies("motion.linear", 3),
-        bodies("motion.angular", 3),
-        state["q"],
-        state["v"],
-        bodies("acceleration", 6),
-        bodies("reaction", 6),
-        bodies("wrench", 6),
-        *(state[field][:, 0] for field in scalars),
-        *[_sixes(state["closure_reaction"])],
+        step=state["step"][:, 0],
+        t=seconds(state["time_ns"][:, 0]),
+        position=bodies("motion.position", 3),
+        orientation=bodies("motion.orientation", 4),
+        linear=bodies("motion.linear", 3),
+        angular=bodies("motion.angular", 3),
+        q=state["q"],
+        v=state["v"],
+        acceleration=bodies("acceleration", 6),
+        reaction=bodies("reaction", 6),
+        wrench=bodies("wrench", 6),
+        **{field: state[field][:, 0] for field in scalars},
+        closure_reaction=_sixes(state["closure_reaction"]),
+        event_time=state["event_time"],
     )
 
 

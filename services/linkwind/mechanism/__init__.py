@@ -9,13 +9,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from linkwind.mechanism.assembly import assemble
+from linkwind.mechanism.events import happenings
 from linkwind.mechanism.start import WORLD_START, JointStart, Start, start
-from linkwind.mechanism.tables import tables
+from linkwind.mechanism.tables import padded, room, tables
 from linkwind.mechanism.tree import WORLD, carriers, order
-from linkwind.native.multibody import Tables
+from linkwind.native.multibody import NQ, NV, Tables
 from linkwind.scenario import Scenario
 from linkwind.spatial import Array
 
@@ -31,6 +30,7 @@ class Mechanism:
         joints: name of the joint that carries each body; an automatic root is ``world-`` and the body's
             name.
         closures: names of the joints that close loops.
+        events: names of what may happen to joints: events, then stops.
         tables: bodies, joints and gravity as flat arrays.
         q0: joint coordinates at the start [m, rad, unit quaternions], shape (nq,).
         v0: joint velocities at the start [m/s, rad/s], shape (nv,).
@@ -40,6 +40,7 @@ class Mechanism:
     bodies: tuple[str, ...]
     joints: tuple[str, ...]
     closures: tuple[str, ...]
+    events: tuple[str, ...]
     tables: Tables
     q0: Array
     v0: Array
@@ -56,8 +57,9 @@ def build(scenario: Scenario) -> Mechanism:
 
     Raises:
         MechanismError: joints that leave the plane of a planar mechanism, springs that do not fit their
-            joint, a body that starts in a way that its joint does not allow, a loop that does not close, or a
-            start from which it is not settled how the mechanism moves.
+            joint, a body that starts in a way that its joint does not allow, a loop that does not close, an
+            event that cannot happen to its joint, or a start from which it is not settled how the mechanism
+            moves.
     """
     carried, loops = carriers(scenario)
     bodies: dict[int, Start] = {WORLD: WORLD_START}
@@ -67,15 +69,18 @@ def build(scenario: Scenario) -> Mechanism:
         bodies[i], joints[i] = start(scenario.bodies[i], carried[i], bodies[carried[i].parent], item)
     count = range(len(carried))
     starts = [joints[i] for i in count]
-    flat = tables(scenario, carried, starts, loops, [bodies[i] for i in count])
-    q0 = np.concatenate([joint.q for joint in starts])
-    v0 = np.concatenate([joint.v for joint in starts])
+    happening = happenings(scenario, carried, loops)
+    flat = tables(scenario, carried, starts, loops, [bodies[i] for i in count], happening)
+    roomy = room([carrier.type for carrier in carried], happening)
+    q0 = padded([joint.q for joint in starts], roomy, NQ)
+    v0 = padded([joint.v for joint in starts], roomy, NV)
     if loops:
         q0, v0 = assemble(scenario, flat, loops, q0, v0)
     return Mechanism(
         bodies=tuple(body.name for body in scenario.bodies),
         joints=tuple(carrier.name for carrier in carried),
         closures=tuple(loop.joint.name for loop in loops),
+        events=tuple(each.name for each in happening),
         tables=flat,
         q0=q0,
         v0=v0,

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from linkwind.errors import MechanismError
+from linkwind.mechanism.events import Happening, event_tables, released
 from linkwind.mechanism.loops import closure_tables
 from linkwind.mechanism.quaternion import matrix
 from linkwind.mechanism.start import JointStart, Start
@@ -18,7 +19,7 @@ from linkwind.spatial import Array
 
 def tables(
     scenario: Scenario, carriers: list[Carrier], joints: list[JointStart], loops: list[Loop],
-    starts: list[Start],
+    starts: list[Start], happening: list[Happening],
 ) -> Tables:  # fmt: skip
     """Return the tables of a mechanism, bodies in scenario order.
 
@@ -28,19 +29,21 @@ def tables(
         joints: the same joints at the start.
         loops: joints that close loops.
         starts: bodies at the start.
+        happening: what may happen to joints.
 
     Raises:
         MechanismError: springs or dampers do not fit the joint's degrees of freedom, or a joint cannot close
             a loop.
     """
     types = [carrier.type for carrier in carriers]
+    roomy = room(types, happening)
     parents = [carrier.parent for carrier in carriers]
     return Tables(
         parent=np.array(parents, dtype=np.int32),
         order=np.array(order(parents), dtype=np.int32),
         joint_type=np.array([JOINT_TYPES[kind] for kind in types], dtype=np.int32),
-        q_index=_starts([NQ[kind] for kind in types]),
-        v_index=_starts([NV[kind] for kind in types]),
+        q_index=_starts([NQ[kind] for kind in roomy]),
+        v_index=_starts([NV[kind] for kind in roomy]),
         parent_point=np.array([carrier.parent_point for carrier in carriers]),
         parent_rotation=np.array([matrix(joint.parent_rotation) for joint in joints]),
         child_point=np.array([carrier.child_point for carrier in carriers]),
@@ -48,10 +51,24 @@ def tables(
         mass=np.array([body.mass for body in scenario.bodies]),
         inertia=np.array([_inertia(body) for body in scenario.bodies]),
         gravity=np.array(scenario.environment.gravity),
-        stiffness=np.concatenate([_per_freedom(carrier, "stiffness") for carrier in carriers]),
-        damping=np.concatenate([_per_freedom(carrier, "damping") for carrier in carriers]),
-        rest=np.concatenate([_rest(carrier) for carrier in carriers]),
+        stiffness=padded([_per_freedom(carrier, "stiffness") for carrier in carriers], roomy, NV),
+        damping=padded([_per_freedom(carrier, "damping") for carrier in carriers], roomy, NV),
+        rest=padded([_rest(carrier) for carrier in carriers], roomy, NQ),
         **closure_tables(loops, starts, planar=scenario.planar),
+        **event_tables(happening),
+    )
+
+
+def room(types: list[str], happening: list[Happening]) -> list[str]:
+    """Return the type whose coordinates each joint has room for: free, where it may be released."""
+    loose = released(happening, len(types))
+    return ["free" if i in loose else kind for i, kind in enumerate(types)]
+
+
+def padded(values: list[Array], roomy: list[str], sizes: dict[str, int]) -> Array:
+    """Return the values of all joints in one row, with zeros where a joint has room for more."""
+    return np.concatenate(
+        [np.pad(own, (0, sizes[kind] - len(own))) for own, kind in zip(values, roomy, strict=True)]
     )
 
 

@@ -35,6 +35,8 @@ _UNITS = {
     "frequency": "Hz",
     "wavenumber": "1/m",
     "phase_deg": "°",
+    "happened": "s",
+    "at": "s",
 }
 _FIRST = ("name", "type", "model", "parent", "child", "mass", "inertia", "shape", "position")
 _SETTINGS = ("time", "environment", "dynamics", "coupling", "bus", "log")
@@ -47,12 +49,24 @@ def tables(run: Run) -> str:
     blocks = [
         _block("Bodies", _records(scenario["bodies"]), opened=True),
         _block("Joints", _records(scenario.get("joints", ())), opened=True),
+        _block("Events", _records(_events(run)), opened=True),
         _block("Force providers", _records(scenario.get("providers", ()))),
         _block("Settings", "".join(_pairs(scenario[name], name) for name in _SETTINGS if name in scenario)),
         _block("Versions and hashes", _pairs({**run.versions, "final_state_sha256": run.final_state_sha256})),
         _block("Scenario as logged", f"<pre>{escape(raw)}</pre>"),
     ]
     return "\n".join(block for block in blocks if block)
+
+
+def _events(run: Run) -> list[dict[str, Any]]:
+    """Return the events of the scenario with the time at which they happened."""
+    times = run.trajectory.event_time
+    last = times[-1] if len(times) else ()
+    stated = run.scenario.get("events", ())
+    happened = [float(at) if at >= 0.0 else "did not happen" for at in last[: len(stated)]]
+    return [
+        {"name": event["name"], "happened": at, **event} for event, at in zip(stated, happened, strict=False)
+    ]
 
 
 def number(value: float) -> str:

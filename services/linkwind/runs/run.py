@@ -56,6 +56,7 @@ class Outcome:
             },
             "joint_gap_max_m": result.joint_gap_max_m,
             "force_max_N": result.force_max_N,
+            "events": result.events,
             "final_state_sha256": result.final_state_sha256,
             "log": str(self.log),
             "report": None if self.report_trouble else str(self.report),

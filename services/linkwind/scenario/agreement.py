@@ -12,12 +12,14 @@ from linkwind.scenario.problems import Path, Problem, choice, show
 from linkwind.scenario.settings import nanoseconds
 
 if TYPE_CHECKING:
-    from linkwind.scenario.bodies import Body
+    from linkwind.scenario.bodies import Body, Joint
     from linkwind.scenario.model import Scenario
     from linkwind.scenario.providers import Provider
 
 
 RESERVED = ("dynamics", "observer", "router", "ca")  # that a provider must not be called: names of roles
+
+SINGLE = ("revolute", "prismatic")  # joint types with one coordinate
 
 
 def disagreements(scenario: Scenario) -> list[Problem]:
@@ -25,7 +27,7 @@ def disagreements(scenario: Scenario) -> list[Problem]:
     repeated = list(_names(scenario))
     if repeated:
         return repeated  # what a name refers to is not known
-    problems = [*_end(scenario), *_inertias(scenario), *_joints(scenario), *_method(scenario)]
+    problems = [problem for check in CHECKS for problem in check(scenario)]
     for index, provider in enumerate(scenario.providers):
         problems += _provider(scenario, provider, ("providers", index))
     return problems + list(_masses(scenario))
@@ -44,6 +46,7 @@ def _names(scenario: Scenario) -> Iterator[Problem]:
     tables = {
         "bodies": [body.name for body in scenario.bodies],
         "joints": [joint.name for joint in scenario.joints],
+        "events": [event.name for event in scenario.events],
         "providers": [provider.name for provider in scenario.providers],
     }
     for table, names in tables.items():
@@ -77,6 +80,25 @@ def _joints(scenario: Scenario) -> Iterator[Problem]:
         if joint.parent == joint.child:
             advice = "Name the body that carries it, or world."
             yield Problem((*path, "parent"), "another body than the child", show(joint.parent), advice)
+
+
+def _events(scenario: Scenario) -> Iterator[Problem]:
+    joints = {joint.name: joint for joint in scenario.joints}
+    for index, event in enumerate(scenario.events):
+        joint = joints.get(event.joint)
+        if joint is None:
+            yield choice(("events", index, "joint"), "one of the joints", list(joints), event.joint)
+        elif event.when in ("position", "speed") and joint.type not in SINGLE:
+            expected = "force, torque or distance, because " + _no_coordinate(joint)
+            yield Problem(("events", index, "when"), expected, show(event.when), "Choose another.")
+    for index, joint in enumerate(scenario.joints):
+        if joint.stop is not None and joint.type not in SINGLE:
+            expected = "none, because " + _no_coordinate(joint)
+            yield Problem(("joints", index, "stop"), expected, show(list(joint.stop)), "Remove it.")
+
+
+def _no_coordinate(joint: Joint) -> str:
+    return f"{joint.name} ({joint.type}) has no single coordinate"
 
 
 def _method(scenario: Scenario) -> Iterator[Problem]:
@@ -156,6 +178,9 @@ def _flow(scenario: Scenario, provider: Provider, path: Path) -> Iterator[Proble
         yield Problem(("environment", "wind"), expected, show(list(scenario.environment.wind)), "Set z to 0.")
     if scenario.environment.density == 0.0:
         yield Problem(("environment", "density"), "a number above 0 for the model flow", "0", "Give it one.")
+
+
+CHECKS = (_end, _inertias, _joints, _events, _method)
 
 
 def _first(names: Sequence[str]) -> str:

@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema, field_validator, mo
 from linkwind.scenario.pictures import Pictures
 from linkwind.scenario.problems import Problem, ProblemError, show
 from linkwind.scenario.quantities import (
+    Interval,
     Name,
     Numbers,
     Quaternion,
@@ -169,6 +170,18 @@ class Joint(Section):
         "m or rad",
         None,
     )
+
+    stop: Interval | None = quantity(
+        "Stops of a joint with one coordinate: the lowest and the highest that it can have", "m or rad", None
+    )
+    restitution: float = quantity("Rate behind a stop over rate before it", "1", 0.0, ge=0.0, le=1.0)
+
+    @field_validator("stop")
+    @classmethod
+    def _stops_apart(cls, stop: tuple[float, float] | None) -> tuple[float, float] | None:
+        if stop is not None and not stop[0] < stop[1]:
+            raise ProblemError.value("two numbers, the lower one first", list(stop), "Swap them.")
+        return stop
 
     @field_validator("axis")
     @classmethod

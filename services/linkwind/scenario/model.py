@@ -8,6 +8,7 @@ from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_
 
 from linkwind.scenario.agreement import disagreements
 from linkwind.scenario.bodies import Body, Joint
+from linkwind.scenario.events import Event
 from linkwind.scenario.problems import ProblemError
 from linkwind.scenario.providers import Provider
 from linkwind.scenario.quantities import Section
@@ -29,6 +30,9 @@ class Scenario(Section):
     environment: Environment = Field(default=Environment(), description="What surrounds the mechanism")
     bodies: tuple[Body, ...] = Field(strict=False, min_length=1, description="The rigid bodies")
     joints: tuple[Joint, ...] = Field(default=(), strict=False, description="The joints between them")
+    events: tuple[Event, ...] = Field(
+        default=(), strict=False, description="What happens to joints: release and lock"
+    )
     providers: tuple[Provider, ...] = Field(
         strict=False, min_length=1, description="The force providers; [aero] is short for one named aero"
     )

@@ -77,6 +77,14 @@ def _quaternion(value: Any) -> tuple[float, float, float, float]:
     return w, x, y, z
 
 
+def _pair(value: Any) -> tuple[float, float]:
+    expected = "a list of 2 numbers"
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        raise ProblemError.value(expected, value, "Write [lowest, highest].")
+    low, high = numbers(value, expected)
+    return low, high
+
+
 def _one_or_more(value: Any) -> float | tuple[float, ...]:
     values = numbers(value, "a number or a list of numbers")
     return values if isinstance(value, list | tuple) else values[0]
@@ -96,6 +104,9 @@ Quaternion = Annotated[
     tuple[float, float, float, float], BeforeValidator(_quaternion), WithJsonSchema(_array(4, 4))
 ]
 """A unit quaternion (w, x, y, z)."""
+
+Interval = Annotated[tuple[float, float], BeforeValidator(_pair), WithJsonSchema(_array(2, 2))]
+"""Two numbers."""
 
 Numbers = Annotated[
     float | tuple[float, ...],
