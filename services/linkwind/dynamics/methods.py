@@ -21,7 +21,8 @@ def multibody(mechanism: Mechanism, scenario: Scenario) -> Multibody:
     Raises:
         MechanismError: the method cannot do this mechanism.
     """
-    dynamics, parts = scenario.dynamics, (mechanism.tables, mechanism.bodies, mechanism.closures)
+    dynamics = scenario.dynamics
+    parts = (mechanism.tables, mechanism.bodies, mechanism.closures, mechanism.events)
     try:
         if dynamics.method == "cfe":
             stabilisation = Stabilisation[dynamics.stabilisation.upper()]
@@ -31,4 +32,4 @@ def multibody(mechanism: Mechanism, scenario: Scenario) -> Multibody:
             return Incremental(*parts)
     except MechanismError as error:
         raise MechanismError(f"{scenario.source}: dynamics.method: {error}") from error
-    return Multibody(*parts, mechanism.events)
+    return Multibody(*parts)
