@@ -29,7 +29,7 @@ def multibody(mechanism: Mechanism, scenario: Scenario) -> Multibody:
             time = dynamics.stabilisation_time
             return Cfe(*parts, stabilisation=stabilisation, time=time)
         if dynamics.method == "incremental":
-            return Incremental(*parts)
+            return Incremental(*parts[:3])
     except MechanismError as error:
         raise MechanismError(f"{scenario.source}: dynamics.method: {error}") from error
     return Multibody(*parts)
