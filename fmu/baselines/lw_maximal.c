@@ -69,9 +69,9 @@ static int accelerations(lw_multibody *mb, const double *q, const double *v, con
     lw_maximal_follow(m, mb);
     lw_kinematics(mb, q, v);
     int status = lw_inverse_inertias(m, mb, fault);
-    if (status) return status;
+    if (status || (status = lw_elements_load(mb, fault))) return status;
     for (int32_t i = 0; i < m->n; ++i) {
-        m->force[i] = own_force(mb, &mb->link[i], wrench);
+        m->force[i] = lw_spatial_axpy(1.0, mb->load[i], own_force(mb, &mb->link[i], wrench));
         mb->link[i].bias_force = none;
     }
     lw_joint_loads(m, mb, q);

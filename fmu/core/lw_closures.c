@@ -6,12 +6,6 @@ static const lw_mat3 identity = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
 
 /* ---- building ---- */
 
-static int32_t link_of(const lw_multibody *mb, int32_t body) {
-    int32_t k = body < 0 ? -1 : mb->n - 1;
-    while (k >= 0 && mb->link[k].body != body) --k;
-    return k;
-}
-
 /* Links in topological order: the later one of two is no ancestor of the other. */
 static void find_path(const lw_multibody *mb, lw_closure *c) {
     int32_t end[2] = {c->link[0], c->link[1]}, *next = c->path;
@@ -46,7 +40,7 @@ void lw_closures_build(lw_multibody *mb, const lw_tables *t) {
         for (int bit = 0; bit < 7; ++bit) c->rows += c->kept >> bit & 1;
         row += c->rows;
         for (int side = 0; side < 2; ++side) {
-            c->link[side] = link_of(mb, t->closure_body[2 * i + side]);
+            c->link[side] = lw_link_of(mb, t->closure_body[2 * i + side]);
             c->point[side] = lw_load3(t->closure_point + 6 * i + 3 * side);
             c->rotation[side] = lw_load9(t->closure_rotation + 18 * i + 9 * side);
         }

@@ -169,6 +169,12 @@ int lw_tree_accelerations(lw_multibody *mb, const double *q, const double *v, co
                           double *joint_acceleration, lw_fault *fault) {
     lw_kinematics(mb, q, v);
     for (int i = 0; i < mb->n; ++i) start(&mb->link[i], mb->gravity, wrench + 6 * mb->link[i].body);
+    if (mb->forces) {
+        int status = lw_elements_load(mb, fault);
+        if (status) return status;
+        for (int i = 0; i < mb->n; ++i)
+            mb->link[i].bias_force = spatial_axpy(-1.0, mb->load[i], mb->link[i].bias_force);
+    }
     for (int i = mb->n - 1; i >= 0; --i) {
         lw_link *l = &mb->link[i];
         double joint_force[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};

@@ -32,7 +32,7 @@ static int derive(lw_run *run, double s, const double *y, double *rate) {
     }
     lw_coordinate_rate(mb, y, v, rate);
     rate[mb->nq + mb->nv] = lw_wrench_power(mb, wrench);
-    rate[mb->nq + mb->nv + 1] = lw_damper_power(mb, v);
+    rate[mb->nq + mb->nv + 1] = lw_damper_power(mb, v) + lw_elements_dissipated(mb);
     return LW_OK;
 }
 

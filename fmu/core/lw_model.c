@@ -16,18 +16,21 @@ int32_t lw_closure_row_count(const lw_tables *t) {
 size_t lw_multibody_size(const lw_tables *t) {
     size_t n = (size_t)t->n, nv = (size_t)t->nv, closures = (size_t)t->closures;
     size_t rows = (size_t)lw_closure_row_count(t), paths = closures * n + 1; /* + 1: an even number */
-    size_t events = (size_t)t->events;
+    size_t events = (size_t)t->events, forces = (size_t)t->forces;
     size_t doubles = 12 * n + 2 * nv + (size_t)t->nq + (3 + LW_MAX_STAGES) * vector_length(t->nq, t->nv);
     doubles += rows * nv + 2 * rows * rows + 4 * rows + 6 * closures + 2 * events;
-    return sizeof(lw_multibody) + n * sizeof(lw_link) + closures * sizeof(lw_closure) + rows * sizeof(lw_row) +
-           events * sizeof(lw_event) + doubles * sizeof(double) + paths / 2 * 2 * sizeof(int32_t);
+    return sizeof(lw_multibody) + n * (sizeof(lw_link) + sizeof(lw_spatial)) + forces * sizeof(lw_element) +
+           closures * sizeof(lw_closure) + rows * sizeof(lw_row) + events * sizeof(lw_event) +
+           doubles * sizeof(double) + paths / 2 * 2 * sizeof(int32_t);
 }
 
 /* Cut the block behind the struct into its arrays. */
 static void lay_out(lw_multibody *mb) {
     size_t n = (size_t)mb->n, length = vector_length(mb->nq, mb->nv), rows = (size_t)mb->rows;
     mb->link = (lw_link *)(mb + 1);
-    mb->closure = (lw_closure *)(mb->link + n);
+    mb->load = (lw_spatial *)(mb->link + n);
+    mb->element = (lw_element *)(mb->load + n);
+    mb->closure = (lw_closure *)(mb->element + mb->forces);
     mb->row = (lw_row *)(mb->closure + mb->closures);
     mb->event = (lw_event *)(mb->row + rows);
     double *next = (double *)(mb->event + mb->events);
@@ -118,6 +121,10 @@ static void build_link(lw_link *l, const lw_tables *t, int i) {
     build_frames(l, t, i);
 }
 
+int32_t lw_link_of(const lw_multibody *mb, int32_t body) {
+    return body < 0 ? -1 : find(mb->link, mb->n, body);
+}
+
 int lw_multibody_init(lw_multibody *mb, const lw_tables *t, lw_fault *fault) {
     int status = lw_tables_check(t, fault);
     if (status) return status;
@@ -125,6 +132,7 @@ int lw_multibody_init(lw_multibody *mb, const lw_tables *t, lw_fault *fault) {
     mb->nq = t->nq;
     mb->nv = t->nv;
     mb->formulation = NULL;
+    mb->forces = t->forces;
     mb->closures = t->closures;
     mb->events = t->events;
     mb->rows = lw_closure_row_count(t);
@@ -138,6 +146,7 @@ int lw_multibody_init(lw_multibody *mb, const lw_tables *t, lw_fault *fault) {
         build_link(&mb->link[k], t, body);
         mb->link[k].parent = t->parent[body] < 0 ? -1 : find(mb->link, k, t->parent[body]);
     }
+    lw_elements_build(mb, t);
     lw_closures_build(mb, t);
     lw_events_build(mb, t);
     return LW_OK;

@@ -71,6 +71,15 @@ typedef struct {
     int32_t envelope; /* first row that a link is shared with */
 } lw_row;
 
+/* A force element, and what it does at the present evaluation. */
+typedef struct {
+    int32_t type, link[2]; /* -1 = world */
+    lw_vec3 point[2];
+    double number[3];
+    double effort;     /* tension [N] */
+    double dissipated; /* power [W] */
+} lw_element;
+
 enum { LW_MAX_STAGES = 7 };
 
 /* Another way to the accelerations than articulated bodies: see ../baselines. */
@@ -88,6 +97,9 @@ struct lw_multibody {
     lw_vec3 gravity;
     lw_link *link; /* n, in topological order */
     double *stiffness, *damping, *rest;
+    int32_t forces;
+    lw_element *element; /* forces */
+    lw_spatial *load;    /* n: force and torque of all elements on each link, in W at the COM */
     int32_t closures, rows, events;
     lw_event *event;   /* events */
     double *happened, *indicator; /* (events) of the state; how far they are from happening */
@@ -102,8 +114,10 @@ struct lw_multibody {
     double *y, *trial, *rate[LW_MAX_STAGES]; /* q, v, work, dissipated: state, stage, derivatives */
 };
 
-/* lw_model.c, lw_tables.c */
+/* lw_model.c: of a joint type; the link that carries a body, -1 for the world */
 int lw_joint_translations(int joint_type);
+int32_t lw_link_of(const lw_multibody *multibody, int32_t body);
+/* lw_tables.c */
 int lw_tables_check(const lw_tables *tables, lw_fault *fault);
 /* lw_kinematics.c: poses, velocities, motion vectors and bias accelerations of all links. */
 void lw_kinematics(lw_multibody *multibody, const double *q, const double *v);
@@ -146,6 +160,12 @@ void lw_joint_force(const lw_multibody *multibody, const lw_link *link, const do
                     double *force);
 double lw_spring_energy(const lw_multibody *multibody, const double *q);
 double lw_damper_power(const lw_multibody *multibody, const double *v);
+/* lw_elements.c, after lw_kinematics: set the load of all force elements; what their dampers take [W]; energy of
+ * their springs [J]. */
+void lw_elements_build(lw_multibody *multibody, const lw_tables *tables);
+int lw_elements_load(lw_multibody *multibody, lw_fault *fault);
+double lw_elements_dissipated(const lw_multibody *multibody);
+double lw_elements_energy(const lw_multibody *multibody);
 /* lw_dynamics.c: set the added inertia of the coming evaluations; accelerations; power of the wrench. */
 void lw_bind_added(lw_multibody *multibody, const double *added_inertia);
 int lw_tree_accelerations(lw_multibody *multibody, const double *q, const double *v, const double *wrench,

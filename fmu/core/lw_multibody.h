@@ -42,11 +42,14 @@ typedef enum {
     LW_ON_DISTANCE  /* between the joint's two points [m] */
 } lw_occasion;
 
+typedef enum { LW_SPRING } lw_force_type; /* between two points */
+enum { LW_FORCE_TYPES = 1 };
+
 /* A mechanism. Joint i carries body i; q_index and v_index are explicit, so that a joint may own more
  * coordinates than its type needs. Coordinates that no joint uses keep their value. Closures are joints
  * that close loops of the tree. */
 typedef struct {
-    int32_t n, nq, nv, closures, events;
+    int32_t n, nq, nv, closures, events, forces;
     const int32_t *parent;         /* (n) index of the parent body, -1 = world */
     const int32_t *order;          /* (n) the bodies, every parent before its children */
     const int32_t *joint_type;     /* (n) lw_joint_type */
@@ -73,6 +76,10 @@ typedef struct {
     const int32_t *event_side;      /* (events) 1: as soon as at or above the threshold, -1: at or below */
     const double *event_threshold;  /* (events) */
     const double *event_restitution; /* (events) of a stop: speed after over speed before, 0 to 1 */
+    const int32_t *force_type;   /* (forces) lw_force_type */
+    const int32_t *force_body;   /* (forces,2) -1 = world */
+    const double *force_point;   /* (forces,2,3) on the bodies, body frame, from the COM [m] */
+    const double *force_number;  /* (forces,3) stiffness [N/m], damping [N s/m], length at rest [m] */
 } lw_tables;
 
 /* 0 is success; `lw_fault` names the item and the time. */
@@ -90,6 +97,7 @@ typedef enum {
     LW_JOINT_OPEN,           /* item: body whose joint cannot be closed */
     LW_OPEN,                 /* item: closure that the mechanism cannot close */
     LW_CROWDED,              /* item: event that happens too often in a step */
+    LW_POINTS_MEET = 14,     /* item: force element whose points coincide, so that it has no direction */
     /* arguments */
     LW_BAD_STEP = 20,
     LW_BAD_NODES,
@@ -123,7 +131,11 @@ typedef enum {
     LW_BAD_EVENT_OCCASION,
     LW_BAD_EVENT_SIDE,
     LW_BAD_EVENT_THRESHOLD,
-    LW_BAD_EVENT_RESTITUTION
+    LW_BAD_EVENT_RESTITUTION,
+    LW_BAD_FORCE_TYPE = 70,
+    LW_BAD_FORCE_BODY,
+    LW_BAD_FORCE_POINT,
+    LW_BAD_FORCE_NUMBER
 } lw_status;
 
 typedef struct {
@@ -137,7 +149,7 @@ typedef struct lw_multibody lw_multibody;
 LW_API int lw_joint_nq(int joint_type);
 LW_API int lw_joint_nv(int joint_type);
 
-/* Bytes that a mechanism needs, 8-byte alignment; reads n, nq, nv, closures and closure_rows. */
+/* Bytes that a mechanism needs, 8-byte alignment; reads the counts and closure_rows. */
 LW_API size_t lw_multibody_size(const lw_tables *tables);
 
 /* Check the tables and build the mechanism in `memory`; the tables may go afterwards. */

@@ -141,10 +141,19 @@ static int check_event(const lw_tables *t, int i) {
     return LW_OK;
 }
 
+static int check_force(const lw_tables *t, int i) {
+    const int32_t *body = t->force_body + 2 * i;
+    if (t->force_type[i] < 0 || t->force_type[i] >= LW_FORCE_TYPES) return LW_BAD_FORCE_TYPE;
+    if (body[0] < -1 || body[0] >= t->n || body[1] < -1 || body[1] >= t->n || body[0] == body[1])
+        return LW_BAD_FORCE_BODY;
+    if (!all_finite(t->force_point + 6 * i, 6)) return LW_BAD_FORCE_POINT;
+    return all_finite(t->force_number + 3 * i, 3) ? LW_OK : LW_BAD_FORCE_NUMBER;
+}
+
 int lw_tables_check(const lw_tables *t, lw_fault *fault) {
     fault->item = 0;
     fault->time = 0.0;
-    if (t->n < 1 || t->nq < 0 || t->nv < 0 || t->closures < 0 || t->events < 0) return LW_BAD_COUNT;
+    if (t->n < 1 || t->nq < 0 || t->nv < 0 || t->closures < 0 || t->events < 0 || t->forces < 0) return LW_BAD_COUNT;
     if (!all_finite(t->gravity, 3)) return LW_BAD_GRAVITY;
     int status = check_coordinate_values(t, fault);
     for (int i = 0; i < t->n && !status; ++i) {
@@ -157,6 +166,10 @@ int lw_tables_check(const lw_tables *t, lw_fault *fault) {
     }
     for (int i = 0; i < t->events && !status; ++i) {
         status = check_event(t, i);
+        fault->item = i;
+    }
+    for (int i = 0; i < t->forces && !status; ++i) {
+        status = check_force(t, i);
         fault->item = i;
     }
     return status;

@@ -16,7 +16,7 @@
  * those of lw_multibody.h; reactions act from parent on child at the joint's point on the child. */
 #define LW_DYNAMICS_KNOWN(X)                                                                             \
     X(MASS, n) X(INERTIA, 6 * n) X(PARENT_POINT, 3 * n) X(CHILD_POINT, 3 * n) X(GRAVITY, 3)              \
-    X(STIFFNESS, nv) X(DAMPING, nv) X(REST, nq) X(RTOL, 1) X(ATOL, 1)                                    \
+    X(STIFFNESS, nv) X(DAMPING, nv) X(REST, nq) X(FORCE_NUMBER, 3 * lw_fmu_forces) X(RTOL, 1) X(ATOL, 1) \
     X(FORCE, 3 * n) X(TORQUE, 3 * n) X(ADDED_INERTIA, 36 * n)                                            \
     X(Q, nq) X(V, nv)
 #define LW_DYNAMICS_CALCULATED(X)                                                                        \
@@ -73,6 +73,8 @@ extern const int32_t lw_fmu_parent[], lw_fmu_order[], lw_fmu_joint_type[], lw_fm
 extern const double lw_fmu_parent_rotation[], lw_fmu_child_rotation[];
 extern const int32_t lw_fmu_closures, lw_fmu_closure_body[], lw_fmu_closure_rows[];
 extern const double lw_fmu_closure_point[], lw_fmu_closure_rotation[], lw_fmu_closure_length[];
+extern const int32_t lw_fmu_forces, lw_fmu_force_type[], lw_fmu_force_body[];
+extern const double lw_fmu_force_point[];
 
 /* ---- aero ---- */
 enum { LW_AERO_PLATE, LW_AERO_FIELD };

@@ -47,12 +47,14 @@ size_t lw_part_memory(void) { return RATES + MAX_ORDER * forces(); }
 static lw_tables constants(void) {
     lw_tables tables = {
         .n = lw_fmu_n, .nq = lw_fmu_nq, .nv = lw_fmu_nv, .closures = lw_fmu_closures,
+        .forces = lw_fmu_forces,
         .parent = lw_fmu_parent, .order = lw_fmu_order, .joint_type = lw_fmu_joint_type,
         .q_index = lw_fmu_q_index, .v_index = lw_fmu_v_index,
         .parent_rotation = lw_fmu_parent_rotation, .child_rotation = lw_fmu_child_rotation,
         .closure_body = lw_fmu_closure_body, .closure_rows = lw_fmu_closure_rows,
         .closure_point = lw_fmu_closure_point, .closure_rotation = lw_fmu_closure_rotation,
-        .closure_length = lw_fmu_closure_length};
+        .closure_length = lw_fmu_closure_length, .force_type = lw_fmu_force_type,
+        .force_body = lw_fmu_force_body, .force_point = lw_fmu_force_point};
     return tables;
 }
 
@@ -140,6 +142,7 @@ int lw_part_configure(lw_instance *instance) {
     tables.parent_point = AT(PARENT_POINT), tables.child_point = AT(CHILD_POINT);
     tables.mass = AT(MASS), tables.inertia = AT(INERTIA), tables.gravity = AT(GRAVITY);
     tables.stiffness = AT(STIFFNESS), tables.damping = AT(DAMPING), tables.rest = AT(REST);
+    tables.force_number = AT(FORCE_NUMBER);
     if (status) return status;
     status = lw_multibody_init(instance->part->multibody, &tables, &fault);
     return status ? refuse_table(instance, status, &fault) : LW_FMI_OK;
@@ -151,8 +154,9 @@ static int discard(const lw_instance *instance, int status, const lw_fault *faul
     const char *expected = "numbers that stay finite", *was = "an overflow";
     if (status == LW_SINGULAR) expected = "a joint with inertia to move", was = "a massless body";
     if (status == LW_OPEN) expected = "loops that stay closed", was = "one that does not reach";
+    if (status == LW_POINTS_MEET) expected = "points apart", was = "two that coincide";
     if (status == LW_STEP_UNDERFLOW) expected = "a substep that meets the tolerance", was = "none";
-    return lw_report(instance, LW_FMI_DISCARD, "Expected %s but was %s at body or loop %d, %.9g s into the step.",
+    return lw_report(instance, LW_FMI_DISCARD, "Expected %s but was %s at body, loop or force %d, %.9g s into the step.",
                      expected, was, fault->item, fault->time);
 }
 
@@ -329,7 +333,8 @@ double lw_part_scale(const lw_instance *instance, const lw_fmu_variable *variabl
     case LW_DYNAMICS_TORQUE:
     case LW_DYNAMICS_GRAVITY:
     case LW_DYNAMICS_STIFFNESS:
-    case LW_DYNAMICS_DAMPING: return 100.0 * fmax(1.0, size); /* no truncation */
+    case LW_DYNAMICS_DAMPING:
+    case LW_DYNAMICS_FORCE_NUMBER: return 100.0 * fmax(1.0, size); /* no truncation */
     case LW_DYNAMICS_PARENT_POINT: return length_scale(instance, AT(PARENT_POINT), place / 3);
     case LW_DYNAMICS_CHILD_POINT: return length_scale(instance, AT(CHILD_POINT), place / 3);
     case LW_DYNAMICS_INERTIA:

@@ -28,6 +28,7 @@ static lw_multibody *build(void) {
     lw_fault fault;
     lw_tables tables = {
         .n = lw_fmu_n, .nq = lw_fmu_nq, .nv = lw_fmu_nv, .closures = lw_fmu_closures,
+        .forces = lw_fmu_forces,
         .parent = lw_fmu_parent, .order = lw_fmu_order, .joint_type = lw_fmu_joint_type,
         .q_index = lw_fmu_q_index, .v_index = lw_fmu_v_index,
         .parent_point = start(LW_DYNAMICS_PARENT_POINT), .parent_rotation = lw_fmu_parent_rotation,
@@ -37,7 +38,9 @@ static lw_multibody *build(void) {
         .damping = start(LW_DYNAMICS_DAMPING), .rest = start(LW_DYNAMICS_REST),
         .closure_body = lw_fmu_closure_body, .closure_rows = lw_fmu_closure_rows,
         .closure_point = lw_fmu_closure_point, .closure_rotation = lw_fmu_closure_rotation,
-        .closure_length = lw_fmu_closure_length};
+        .closure_length = lw_fmu_closure_length, .force_type = lw_fmu_force_type,
+        .force_body = lw_fmu_force_body, .force_point = lw_fmu_force_point,
+        .force_number = lw_fmu_forces ? start(LW_DYNAMICS_FORCE_NUMBER) : 0};
     lw_multibody *memory = malloc(lw_multibody_size(&tables));
     if (lw_multibody_init(memory, &tables, &fault)) abort();
     return memory;

@@ -82,6 +82,23 @@ parent = "world"
 child = "sledge"
 child_point = [0.05, 0.0, 0.0]
 stiffness = [1.0, 2.0, 0.5]
+[[forces]]
+name = "flap"
+type = "spring"
+parent = "flap"
+child = "lid"
+parent_point = [0.2, 0.0, 0.1]
+stiffness = 8.0
+damping = 0.3
+[[forces]]
+name = "tether"
+type = "spring"
+parent = "world"
+child = "sledge"
+parent_point = [1.0, 1.0, 1.0]
+child_point = [0.1, 0.0, 0.0]
+stiffness = 3.0
+rest = 0.5
 [aero]
 model = "field"
 [aero.field.hub]

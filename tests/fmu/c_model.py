@@ -30,6 +30,7 @@ KNOWN = {
     "STIFFNESS",
     "DAMPING",
     "REST",
+    "FORCE_NUMBER",
     "RTOL",
     "ATOL",
     "FORCE",
@@ -102,6 +103,7 @@ def _model(part, sections, start, calculated, integers, constants, scalar, token
 def dynamics(tables: Tables, q0, v0, *, integrator=2, substeps=1, scalar=False, token=TOKEN) -> Model:
     """Return the FMU of a mechanism."""
     n, nq, nv, closures = len(tables.parent), len(q0), len(v0), len(tables.closure_rows)
+    forces = len(tables.force_type)
     sections = {
         "MASS": n,
         "INERTIA": 6 * n,
@@ -111,6 +113,7 @@ def dynamics(tables: Tables, q0, v0, *, integrator=2, substeps=1, scalar=False, 
         "STIFFNESS": nv,
         "DAMPING": nv,
         "REST": nq,
+        "FORCE_NUMBER": 3 * forces,
         "RTOL": 1,
         "ATOL": 1,
         "FORCE": 3 * n,
@@ -136,11 +139,15 @@ def dynamics(tables: Tables, q0, v0, *, integrator=2, substeps=1, scalar=False, 
     start = {name: getattr(tables, name.lower()) for name in sections if hasattr(tables, name.lower())}
     start |= {"RTOL": 1e-6, "ATOL": 1e-9, "Q": q0, "V": v0}
     constants = f"const int32_t lw_fmu_n = {n}, lw_fmu_nq = {nq}, lw_fmu_nv = {nv};\n"
-    constants += f"const int32_t lw_fmu_closures = {closures};\n"
-    for name in ("parent", "order", "joint_type", "q_index", "v_index", "closure_body", "closure_rows"):
+    constants += f"const int32_t lw_fmu_closures = {closures}, lw_fmu_forces = {forces};\n"
+    for name in (
+        "parent", "order", "joint_type", "q_index", "v_index", "closure_body", "closure_rows", "force_type",
+        "force_body",
+    ):  # fmt: skip
         constants += _array("int32_t", name, getattr(tables, name))
     for name in (
         "parent_rotation", "child_rotation", "closure_point", "closure_rotation", "closure_length",
+        "force_point",
     ):  # fmt: skip
         constants += _array("double", name, getattr(tables, name))
     integers = {"INTEGRATOR": integrator, "SUBSTEPS": substeps}

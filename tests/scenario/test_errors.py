@@ -14,8 +14,8 @@ BODY_KEYS = (
     "name, mass, inertia, shape, picture, position, angle_deg, orientation, velocity, angular_velocity"
 )
 TOP_KEYS = (
-    "name, description, time, environment, bodies, joints, events, providers, dynamics, coupling, bus, "
-    "log, aero"
+    "name, description, time, environment, bodies, joints, events, forces, providers, dynamics, coupling, "
+    "bus, log, aero"
 )
 PLATE = 'shape = { type = "plate", length = 0.5, span = 1.0 }'
 

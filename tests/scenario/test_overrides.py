@@ -56,7 +56,7 @@ def test_aero_can_be_set_where_the_file_has_no_provider():
          'got "stepp". Use "step".'),
         ("couplin.step=3",
          "couplin: expected a key among name, description, time, environment, bodies, joints, events, "
-         'providers, dynamics, coupling, bus, log, aero; got "couplin". Use "coupling".'),
+         'forces, providers, dynamics, coupling, bus, log, aero; got "couplin". Use "coupling".'),
         ("coupling", 'expected KEY=VALUE; got "coupling". For example coupling.step=5e-4.'),
         ("=3", 'expected KEY=VALUE; got "=3". For example coupling.step=5e-4.'),
         ("coupling..step=3", 'expected KEY=VALUE; got "coupling..step=3". For example coupling.step=5e-4.'),
@@ -67,8 +67,8 @@ def test_aero_can_be_set_where_the_file_has_no_provider():
         ("bodies.-1.mass=2",
          'bodies: expected the index or name of an entry: link1, link2; got "-1". Use one of these.'),
         ("cfd.model=plate",
-         "cfd: expected a key among name, description, time, environment, bodies, joints, events, providers, "
-         'dynamics, coupling, bus, log, aero; got "cfd". Remove it.'),
+         "cfd: expected a key among name, description, time, environment, bodies, joints, events, "
+         'forces, providers, dynamics, coupling, bus, log, aero; got "cfd". Remove it.'),
         ("environment.wind.3=2",
          'environment.wind: expected an index from 0 to 2; got "3". Use one of these.'),
         ("environment.gusts.0.frequency=1",

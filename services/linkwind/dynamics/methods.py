@@ -23,13 +23,18 @@ def multibody(mechanism: Mechanism, scenario: Scenario) -> Multibody:
     """
     dynamics = scenario.dynamics
     parts = (mechanism.tables, mechanism.bodies, mechanism.closures, mechanism.events)
+    if mechanism.forces and dynamics.method == "incremental":
+        raise MechanismError(
+            f"{scenario.source}: dynamics.method: expected reduced or cfe, because {mechanism.forces[0]} is "
+            "a force element, which the paper does not have; got incremental. Use reduced."
+        )
     try:
         if dynamics.method == "cfe":
             stabilisation = Stabilisation[dynamics.stabilisation.upper()]
             time = dynamics.stabilisation_time
-            return Cfe(*parts, stabilisation=stabilisation, time=time)
+            return Cfe(*parts, forces=mechanism.forces, stabilisation=stabilisation, time=time)
         if dynamics.method == "incremental":
             return Incremental(*parts[:3])
     except MechanismError as error:
         raise MechanismError(f"{scenario.source}: dynamics.method: {error}") from error
-    return Multibody(*parts)
+    return Multibody(*parts, forces=mechanism.forces)

@@ -82,6 +82,18 @@ def joint_names(mechanism: Mechanism) -> list[str]:
     return names
 
 
+def force_names(mechanism: Mechanism) -> list[str]:
+    """Return the name that each force element has in the FMU."""
+    taken = {*mechanism.bodies, *joint_names(mechanism)}
+    names = []
+    for name in mechanism.forces:
+        while name in taken:
+            name += "_force"
+        taken.add(name)
+        names.append(name)
+    return names
+
+
 def pieces(mechanism: Mechanism) -> list[list[Piece]]:
     """Return the pieces of every joint; none for a fixed one."""
     tables = mechanism.tables

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from linkwind.fmi import units
-from linkwind.fmi.coordinates import Piece, joint_names, pieces
+from linkwind.fmi.coordinates import Piece, force_names, joint_names, pieces
 from linkwind.fmi.structure import Dependences, Structure, is_stated
 from linkwind.fmi.units import Quantity
 from linkwind.fmi.variables import Dependence, Variability, Variable
@@ -41,6 +41,7 @@ def variables(scenario: Scenario, mechanism: Mechanism) -> list[Variable]:
         *_derivatives(mechanism, structure),
         *_body_parameters(mechanism),
         *_joint_parameters(mechanism),
+        *_force_parameters(mechanism),
         *_solver(scenario),
     ]
 
@@ -236,6 +237,19 @@ def _springs(piece: Piece, mechanism: Mechanism) -> Iterator[Variable]:
             piece.called(what), section, first, values if count > 1 else float(values[0]), quantity,
             f"{about} of joint {piece.name}",
         )  # fmt: skip
+
+
+def _force_parameters(mechanism: Mechanism) -> Iterator[Variable]:
+    numbers = (
+        ("stiffness", units.STIFFNESS, "Stiffness"),
+        ("damping", units.DAMPING, "Damping"),
+        ("rest", units.LENGTH, "Length without tension"),
+    )
+    for i, name in enumerate(force_names(mechanism)):
+        for k, (what, quantity, about) in enumerate(numbers):
+            value = float(mechanism.tables.force_number[i, k])
+            at = 3 * i + k
+            yield parameter(f"{name}.{what}", "FORCE_NUMBER", at, value, quantity, f"{about} of {name}")
 
 
 def _solver(scenario: Scenario) -> Iterator[Variable]:

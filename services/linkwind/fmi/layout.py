@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import accumulate
 
 
-def dynamics_sections(n: int, nq: int, nv: int, closures: int) -> dict[str, int]:
+def dynamics_sections(n: int, nq: int, nv: int, closures: int, forces: int) -> dict[str, int]:
     """Return the size of each section, in order.
 
     Args:
@@ -13,10 +13,12 @@ def dynamics_sections(n: int, nq: int, nv: int, closures: int) -> dict[str, int]
         nq: number of coordinates.
         nv: number of degrees of freedom of the tree.
         closures: number of joints that close loops.
+        forces: number of force elements.
     """
     known = {
         "MASS": n, "INERTIA": 6 * n, "PARENT_POINT": 3 * n, "CHILD_POINT": 3 * n, "GRAVITY": 3,
-        "STIFFNESS": nv, "DAMPING": nv, "REST": nq, "RTOL": 1, "ATOL": 1,
+        "STIFFNESS": nv, "DAMPING": nv, "REST": nq,
+        "FORCE_NUMBER": 3 * forces, "RTOL": 1, "ATOL": 1,
         "FORCE": 3 * n, "TORQUE": 3 * n, "ADDED_INERTIA": 36 * n, "Q": nq, "V": nv,
     }  # fmt: skip
     calculated = {

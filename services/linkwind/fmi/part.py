@@ -93,7 +93,7 @@ class Part:
         """Set the parameters of automatic joints, which have no variables."""
         if self.name == "dynamics":
             tables = self.mechanism.tables
-            for section in ("PARENT_POINT", "CHILD_POINT", "STIFFNESS", "DAMPING", "REST"):
+            for section in ("PARENT_POINT", "CHILD_POINT", "STIFFNESS", "DAMPING", "REST", "FORCE_NUMBER"):
                 table = getattr(tables, section.lower()).ravel()
                 values[first[section] : first[section] + len(table)] = table
 
@@ -118,7 +118,7 @@ def dynamics_part(scenario: Scenario, *, native_arrays: bool) -> Part:
     return Part(
         "dynamics", scenario, mechanism, None,
         variables if native_arrays else scalars(variables),
-        dynamics_sections(n, nq, nv, len(mechanism.closures)),
+        dynamics_sections(n, nq, nv, len(mechanism.closures), len(mechanism.forces)),
         (integers[0], integers[1]),
         {
             "n": n, "nq": nq, "nv": nv, "parent": tables.parent, "order": tables.order,
@@ -128,6 +128,8 @@ def dynamics_part(scenario: Scenario, *, native_arrays: bool) -> Part:
             "closure_body": tables.closure_body, "closure_rows": tables.closure_rows,
             "closure_point": tables.closure_point, "closure_rotation": tables.closure_rotation,
             "closure_length": tables.closure_length,
+            "forces": len(mechanism.forces), "force_type": tables.force_type, "force_body": tables.force_body,
+            "force_point": tables.force_point,
         },
     )  # fmt: skip
 

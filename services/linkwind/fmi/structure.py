@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from linkwind.fmi.coordinates import Piece, joint_names, pieces
+from linkwind.fmi.coordinates import Piece, force_names, joint_names, pieces
 from linkwind.fmi.variables import Dependence, Kind
 from linkwind.mechanism import Mechanism
 
@@ -21,8 +21,9 @@ class Structure:
         self._stated = [is_stated(joint) for joint in mechanism.joints]
         self._pieces = pieces(mechanism)
         self._path = [_path(i, parents) for i in range(len(parents))]
-        roots = [path[0] for path in self._path]
-        self._root = roots
+        self._forces = force_names(mechanism)
+        self._root = roots = _groups(mechanism, [path[0] for path in self._path])
+        self._pulls = [int(bodies.max()) for bodies in mechanism.tables.force_body]  # one of the bodies
         self._accelerations = {root: self._acceleration(self._tree(root)) for root in set(roots)}
         self._inertias = {root: self._inertia(self._tree(root)) for root in set(roots)}
 
@@ -90,6 +91,10 @@ class Structure:
         bodies = tuple(Dependence(f"{self._bodies[k]}.{what}") for k in tree for what in ("mass", "inertia"))
         points = self._parameters(stated, "parent_point", "child_point")
         springs = self._springs(stated, "stiffness", "damping", "rest")
+        pulls = [name for name, body in zip(self._forces, self._pulls, strict=True) if body in tree]
+        springs += tuple(
+            Dependence(f"{name}.{what}") for name in pulls for what in ("stiffness", "damping", "rest")
+        )
         return (Dependence("gravity"), *bodies, *points, *springs)
 
     def stored(self) -> Dependences:
@@ -97,7 +102,11 @@ class Structure:
         stated = [k for k, yes in enumerate(self._stated) if yes]
         masses = tuple(Dependence(f"{body}.mass") for body in self._bodies)
         points = self._parameters(stated, "parent_point", "child_point")
-        return (Dependence("gravity"), *masses, *points, *self._springs(stated, "stiffness", "rest"))
+        springs = self._springs(stated, "stiffness", "rest")
+        springs += tuple(
+            Dependence(f"{name}.{what}") for name in self._forces for what in ("stiffness", "rest")
+        )
+        return (Dependence("gravity"), *masses, *points, *springs)
 
     def moving(self) -> Dependences:
         """Parameters of the kinetic energy."""
@@ -115,6 +124,15 @@ class Structure:
         return tuple(
             Dependence(piece.called(what)) for k in joints for piece in self._pieces[k] for what in whats
         )
+
+
+def _groups(mechanism: Mechanism, roots: list[int]) -> list[int]:
+    """Return for each body the same number as for those that it acts on, also by loops and elements."""
+    group = list(roots)
+    for first, second in [*mechanism.tables.closure_body.tolist(), *mechanism.tables.force_body.tolist()]:
+        if first >= 0 and second >= 0:
+            group = [group[second] if own == group[first] else own for own in group]
+    return group
 
 
 def is_stated(joint: str) -> bool:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from linkwind.mechanism.assembly import assemble
 from linkwind.mechanism.events import happenings
+from linkwind.mechanism.forces import with_forces
 from linkwind.mechanism.start import WORLD_START, JointStart, Start, start
 from linkwind.mechanism.tables import padded, room, tables
 from linkwind.mechanism.tree import WORLD, carriers, order
@@ -31,6 +32,7 @@ class Mechanism:
             name.
         closures: names of the joints that close loops.
         events: names of what may happen to joints: events, then stops.
+        forces: names of the force elements.
         tables: bodies, joints and gravity as flat arrays.
         q0: joint coordinates at the start [m, rad, unit quaternions], shape (nq,).
         v0: joint velocities at the start [m/s, rad/s], shape (nv,).
@@ -41,6 +43,7 @@ class Mechanism:
     joints: tuple[str, ...]
     closures: tuple[str, ...]
     events: tuple[str, ...]
+    forces: tuple[str, ...]
     tables: Tables
     q0: Array
     v0: Array
@@ -58,8 +61,8 @@ def build(scenario: Scenario) -> Mechanism:
     Raises:
         MechanismError: joints that leave the plane of a planar mechanism, springs that do not fit their
             joint, a body that starts in a way that its joint does not allow, a loop that does not close, an
-            event that cannot happen to its joint, or a start from which it is not settled how the mechanism
-            moves.
+            event that cannot happen to its joint, a force element that does not fit, or a
+            start from which it is not settled how the mechanism moves.
     """
     carried, loops = carriers(scenario)
     bodies: dict[int, Start] = {WORLD: WORLD_START}
@@ -81,7 +84,8 @@ def build(scenario: Scenario) -> Mechanism:
         joints=tuple(carrier.name for carrier in carried),
         closures=tuple(loop.joint.name for loop in loops),
         events=tuple(each.name for each in happening),
-        tables=flat,
+        forces=tuple(force.name for force in scenario.forces),
+        tables=with_forces(flat, scenario, q0, v0),
         q0=q0,
         v0=v0,
         has_joints=bool(scenario.joints),

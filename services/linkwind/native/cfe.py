@@ -48,6 +48,7 @@ class Cfe(Multibody):
         bodies: Sequence[str] = (),
         closures: Sequence[str] = (),
         events: Sequence[str] = (),
+        forces: Sequence[str] = (),
         *,
         stabilisation: Stabilisation,
         time: float,
@@ -59,6 +60,7 @@ class Cfe(Multibody):
             bodies: names of the bodies, for errors; their numbers if not given.
             closures: likewise of the joints that close loops.
             events: likewise of what may happen.
+            forces: likewise of the force elements.
             stabilisation: of the joints.
             time: in which Baumgarte's method undoes what a joint is open [s]: it goes back as exp(-t/time).
 
@@ -66,7 +68,7 @@ class Cfe(Multibody):
             MechanismError: a table has a wrong shape or a wrong value, or an event is none that this method
                 knows: release of a joint that carries a body, on command, at a time, on a force or torque.
         """
-        self.tree = Multibody(tables, bodies, closures, events)
+        self.tree = Multibody(tables, bodies, closures, events, forces)
         _check_events(self.tree)
         super().__init__(_free(tables))
         self._names = self.tree._names
@@ -102,10 +104,11 @@ class Cfe(Multibody):
 def _check_events(tree: Multibody) -> None:
     t, occasions = tree.tables, [OCCASIONS[name] for name in ("command", "time", "force", "torque")]
     carries = (t.event_joint < tree.n) & (t.event_action == ACTIONS["release"])
-    for i in np.flatnonzero(~(carries & np.isin(t.event_occasion, occasions))):
+    for i in map(int, np.flatnonzero(~(carries & np.isin(t.event_occasion, occasions)))):
         raise MechanismError(
-            f"event {tree._names[2][i]}: expected the release of a joint that carries a body, on command, at "
-            "a time, on a force or a torque, which is all that method cfe knows; got another. Use reduced."
+            f"event {tree._names.events[i]}: expected the release of a joint that carries a body, on "
+            "command, at a time, on a force or a torque, which is all that method cfe knows; got another. "
+            "Use reduced."
         )
 
 
@@ -136,4 +139,8 @@ def _free(tables: Tables) -> Tables:
         event_threshold=tables.event_threshold,
         event_restitution=tables.event_restitution,
         rest=np.concatenate([np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], n), np.zeros(angles)]),
+        force_type=tables.force_type,
+        force_body=tables.force_body,
+        force_point=tables.force_point,
+        force_number=tables.force_number,
     )

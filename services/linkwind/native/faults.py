@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from linkwind.errors import SimulationError
 
@@ -13,6 +13,15 @@ class Fault(ctypes.Structure):
     """``lw_fault``: the item, and the time [s] within the macro step."""
 
     _fields_ = [("item", ctypes.c_int32), ("time", ctypes.c_double)]
+
+
+class Names(NamedTuple):
+    """Of what an item may be, for messages: in quotes."""
+
+    bodies: Sequence[str]
+    closures: Sequence[str]
+    events: Sequence[str]
+    forces: Sequence[str]
 
 
 _REPAIR = "Check forces, stiffnesses and dampers; a smaller step, more substeps or dopri5 may help"
@@ -33,9 +42,11 @@ _NUMERICS = {
     10: ("joint {item}", "bodies that close the loop", "a position from which they do not reach",
         "Check points, lengths and the start; a smaller step may help"),
     11: ("event {item}", "a few times within a step", "a thousand", "Give its stop a smaller restitution"),
+    14: ("force {item}", "two points apart", "points that coincide, so that it has no direction",
+        "Move one of the points; a smaller step may help"),
 }  # fmt: skip
 _UNNAMED = (3, 6)  # the item is no body
-_KINDS = {10: 1, 11: 2}  # it is a joint that closes a loop, or an event
+_KINDS = {10: 1, 11: 2, 14: 3}  # it is a joint that closes a loop, an event, or a force element
 _ARGUMENTS = {
     20: ("h", "a positive macro step [s]"),
     21: ("nodes", "1 to 8 distinct finite nodes"),
@@ -45,13 +56,8 @@ _ARGUMENTS = {
 }
 
 
-def fail(
-    status: int,
-    fault: Fault,
-    names: Sequence[Sequence[str]],
-    arguments: dict[str, Any],
-) -> NoReturn:
-    """Raise what the core reported; ``names`` are those of bodies, closures and events.
+def fail(status: int, fault: Fault, names: Names, arguments: dict[str, Any]) -> NoReturn:
+    """Raise what the core reported; ``names`` are those of items.
 
     Raises:
         ValueError: one of the ``arguments`` of the call makes no sense.

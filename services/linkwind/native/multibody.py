@@ -12,12 +12,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from linkwind.native.faults import Fault, fail
+from linkwind.native.faults import Fault, Names, fail
 from linkwind.native.library import declare
 from linkwind.native.results import AffineStep, Evaluation, Integrator
 from linkwind.native.tables import (
     ACTIONS,
     DISTANCE,
+    FORCE_TYPES,
     JOINT_TYPES,
     KEEP_ROTATION,
     KEEP_TRANSLATION,
@@ -35,6 +36,7 @@ from linkwind.spatial import Array, Motion, address
 __all__ = [
     "ACTIONS",
     "DISTANCE",
+    "FORCE_TYPES",
     "JOINT_TYPES",
     "KEEP_ROTATION",
     "KEEP_TRANSLATION",
@@ -88,6 +90,7 @@ class Multibody:
         closures: number of joints that close loops of it.
         rows: number of equations that they are.
         events: number of things that may happen to joints.
+        forces: number of force elements.
         state_size: length of a state: q, v, the substep [s] that dopri5 would take next (0 = unknown), and
             for each event the time at which it happened [s], or ``NOT_YET``; a stop has since when its joint
             rests on it.
@@ -99,6 +102,7 @@ class Multibody:
         bodies: Sequence[str] = (),
         closures: Sequence[str] = (),
         events: Sequence[str] = (),
+        forces: Sequence[str] = (),
     ) -> None:
         """Build the mechanism.
 
@@ -107,6 +111,7 @@ class Multibody:
             bodies: names of the bodies, for errors; their numbers if not given.
             closures: likewise of the joints that close loops.
             events: likewise of what may happen.
+            forces: likewise of the force elements.
 
         Raises:
             MechanismError: a table has a wrong shape or a wrong value.
@@ -114,15 +119,14 @@ class Multibody:
         arrays = contiguous(tables)
         self.tables = tables
         self.n, self.nq, self.nv = len(tables.parent), len(tables.rest), len(tables.stiffness)
-        self.closures = len(tables.closure_rows)
-        self.events = len(tables.event_joint)
-        counts = (self.n, self.closures, self.events)
-        self._names = tuple(map(_quoted, (bodies, closures, events), counts))
+        self.closures, self.events = len(tables.closure_rows), len(tables.event_joint)
+        self.forces = len(tables.force_type)
+        named = (bodies, self.n), (closures, self.closures), (events, self.events), (forces, self.forces)
+        self._names = Names(*(_quoted(names, count) for names, count in named))
         self.state_size = self.nq + self.nv + 1 + self.events
         pointers = {name: array.ctypes.data for name, array in arrays.items()}
-        native = CTables(
-            n=self.n, nq=self.nq, nv=self.nv, closures=self.closures, events=self.events, **pointers
-        )
+        counts = {name: getattr(self, name) for name in ("n", "nq", "nv", "closures", "events", "forces")}
+        native = CTables(**counts, **pointers)
         self.rows = _row_count(ctypes.addressof(native))
         self._memory = np.zeros((_size(ctypes.addressof(native)) + 7) // 8)
         self._state, self._next = np.zeros(self.state_size), np.zeros(self.state_size)

@@ -35,6 +35,7 @@ OCCASIONS: dict[str, int] = {
     "distance": 6,
 }
 KEEP_TRANSLATION, KEEP_ROTATION, DISTANCE = (1, 2, 4), (8, 16, 32), 64  # bits of closure_rows
+FORCE_TYPES: dict[str, int] = {"spring": 0}
 QUATERNION_AT = {JOINT_TYPES["spherical"]: 0, JOINT_TYPES["free"]: 3}
 
 
@@ -71,6 +72,10 @@ class Tables:
         event_side: 1 for at or above the threshold, -1 for at or below it, int32, shape (e,).
         event_threshold: [s, N, N·m, rad, m or per second], shape (e,).
         event_restitution: of a stop, 0 to 1, shape (e,).
+        force_type: codes of ``FORCE_TYPES`` of f force elements, int32, shape (f,).
+        force_body: the two bodies of each, -1 for the world, int32, shape (f, 2).
+        force_point: its points on both bodies, body frame, from the centre of mass [m], shape (f, 2, 3).
+        force_number: stiffness [N/m], damping [N·s/m], length without tension [m], shape (f, 3).
     """
 
     parent: Index
@@ -99,12 +104,16 @@ class Tables:
     event_side: Index = field(default_factory=lambda: np.zeros(0, np.int32))
     event_threshold: Array = field(default_factory=lambda: np.zeros(0))
     event_restitution: Array = field(default_factory=lambda: np.zeros(0))
+    force_type: Index = field(default_factory=lambda: np.zeros(0, np.int32))
+    force_body: Index = field(default_factory=lambda: np.zeros((0, 2), np.int32))
+    force_point: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))
+    force_number: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 class CTables(ctypes.Structure):
     """``lw_tables`` of the library."""
 
-    _fields_ = [(name, ctypes.c_int32) for name in ("n", "nq", "nv", "closures", "events")] + [
+    _fields_ = [(name, ctypes.c_int32) for name in ("n", "nq", "nv", "closures", "events", "forces")] + [
         (table.name, ctypes.c_void_p) for table in fields(Tables)
     ]
 
@@ -137,27 +146,33 @@ _CHECKS = {
     64: ("event_side", "1 or -1"),
     65: ("event_threshold", "a finite number"),
     66: ("event_restitution", "a number from 0 to 1"),
+    70: ("force_type", "one of " + ", ".join(f"{code} ({name})" for name, code in FORCE_TYPES.items())),
+    71: ("force_body", "two different bodies, -1 for the world"),
+    72: ("force_point", "finite numbers"),
+    73: ("force_number", "finite numbers"),
 }
 
 
 _INTEGERS = (
     "parent", "order", "joint_type", "q_index", "v_index", "closure_body", "closure_rows", "event_joint",
-    "event_action", "event_occasion", "event_side",
+    "event_action", "event_occasion", "event_side", "force_type", "force_body",
 )  # fmt: skip
 
 
-def _shapes(n: int, nq: int, nv: int, closures: int, events: int) -> dict[str, tuple[int, ...]]:
+def _shapes(n: int, nq: int, nv: int, closures: int, events: int, forces: int) -> dict[str, tuple[int, ...]]:
     integers = dict.fromkeys(("parent", "order", "joint_type", "q_index", "v_index"), (n,))
     points = dict.fromkeys(("parent_point", "child_point"), (n, 3))
     rotations = dict.fromkeys(("parent_rotation", "child_rotation"), (n, 3, 3))
     degrees = dict.fromkeys(("stiffness", "damping"), (nv,))
     happening = ("joint", "action", "occasion", "side", "threshold", "restitution")
     closed = {"body": (2,), "rows": (), "point": (2, 3), "rotation": (2, 3, 3), "length": ()}
+    pushing = {"type": (), "body": (2,), "point": (2, 3), "number": (3,)}
     return (
         {"mass": (n,), "inertia": (n, 6), "gravity": (3,), "rest": (nq,)}
         | integers | points | rotations | degrees
         | {f"closure_{name}": (closures, *shape) for name, shape in closed.items()}
         | {f"event_{name}": (events,) for name in happening}
+        | {f"force_{name}": (forces, *shape) for name, shape in pushing.items()}
     )  # fmt: skip
 
 
@@ -165,7 +180,10 @@ def contiguous(tables: Tables) -> dict[str, NDArray[Any]]:
     """Return the tables as contiguous arrays of the right type, or raise MechanismError for a shape."""
     n, nq, nv = np.size(tables.parent), np.size(tables.rest), np.size(tables.stiffness)
     arrays = {}
-    for name, shape in _shapes(n, nq, nv, np.size(tables.closure_rows), np.size(tables.event_joint)).items():
+    closures, events, forces = (
+        np.size(t) for t in (tables.closure_rows, tables.event_joint, tables.force_type)
+    )
+    for name, shape in _shapes(n, nq, nv, closures, events, forces).items():
         wanted = np.int32 if name in _INTEGERS else np.float64
         arrays[name] = np.ascontiguousarray(getattr(tables, name), dtype=wanted)
         if np.shape(getattr(tables, name)) != shape:

@@ -50,6 +50,7 @@ def tables(run: Run) -> str:
         _block("Bodies", _records(scenario["bodies"]), opened=True),
         _block("Joints", _records(scenario.get("joints", ())), opened=True),
         _block("Events", _records(_events(run)), opened=True),
+        _block("Force elements", _records(scenario.get("forces", ()))),
         _block("Force providers", _records(scenario.get("providers", ()))),
         _block("Settings", "".join(_pairs(scenario[name], name) for name in _SETTINGS if name in scenario)),
         _block("Versions and hashes", _pairs({**run.versions, "final_state_sha256": run.final_state_sha256})),

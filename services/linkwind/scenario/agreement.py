@@ -47,6 +47,7 @@ def _names(scenario: Scenario) -> Iterator[Problem]:
         "bodies": [body.name for body in scenario.bodies],
         "joints": [joint.name for joint in scenario.joints],
         "events": [event.name for event in scenario.events],
+        "forces": [force.name for force in scenario.forces],
         "providers": [provider.name for provider in scenario.providers],
     }
     for table, names in tables.items():
@@ -99,6 +100,19 @@ def _events(scenario: Scenario) -> Iterator[Problem]:
 
 def _no_coordinate(joint: Joint) -> str:
     return f"{joint.name} ({joint.type}) has no single coordinate"
+
+
+def _forces(scenario: Scenario) -> Iterator[Problem]:
+    known = [*(body.name for body in scenario.bodies), "world"]
+    for index, force in enumerate(scenario.forces):
+        for key, word in (("parent", force.parent), ("child", force.child)):
+            if word not in known:
+                yield choice(("forces", index, key), "one of the bodies", known, word)
+        if force.parent == force.child:
+            advice = "Name another body, or world."
+            yield Problem(
+                ("forces", index, "child"), "another body than the parent", show(force.child), advice
+            )
 
 
 def _method(scenario: Scenario) -> Iterator[Problem]:
@@ -180,7 +194,7 @@ def _flow(scenario: Scenario, provider: Provider, path: Path) -> Iterator[Proble
         yield Problem(("environment", "density"), "a number above 0 for the model flow", "0", "Give it one.")
 
 
-CHECKS = (_end, _inertias, _joints, _events, _method)
+CHECKS = (_end, _inertias, _joints, _events, _forces, _method)
 
 
 def _first(names: Sequence[str]) -> str:

@@ -9,6 +9,7 @@ from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_
 from linkwind.scenario.agreement import disagreements
 from linkwind.scenario.bodies import Body, Joint
 from linkwind.scenario.events import Event
+from linkwind.scenario.forces import Force
 from linkwind.scenario.problems import ProblemError
 from linkwind.scenario.providers import Provider
 from linkwind.scenario.quantities import Section
@@ -32,6 +33,9 @@ class Scenario(Section):
     joints: tuple[Joint, ...] = Field(default=(), strict=False, description="The joints between them")
     events: tuple[Event, ...] = Field(
         default=(), strict=False, description="What happens to joints: release and lock"
+    )
+    forces: tuple[Force, ...] = Field(
+        default=(), strict=False, description="Force elements of the mechanism: springs between points"
     )
     providers: tuple[Provider, ...] = Field(
         strict=False, min_length=1, description="The force providers; [aero] is short for one named aero"

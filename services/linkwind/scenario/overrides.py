@@ -8,7 +8,13 @@ from typing import Any
 from linkwind.scenario.problems import Path, Problem, ProblemError, choice, show
 
 # Where the scenario has lists of tables: a file may leave them out.
-TABLE_LISTS: tuple[Path, ...] = (("bodies",), ("joints",), ("providers",), ("environment", "gusts"))
+TABLE_LISTS: tuple[Path, ...] = (
+    ("bodies",),
+    ("joints",),
+    ("forces",),
+    ("providers",),
+    ("environment", "gusts"),
+)
 
 
 def override(data: dict[str, Any], argument: str) -> Path:
