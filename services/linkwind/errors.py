@@ -15,6 +15,7 @@
     │   ├── ProtocolError                a message that the lock-step protocol does not allow
     │   ├── LostError                    a participant died, stopped or never came
     │   ├── AnswerTimeoutError           a participant is alive but does not answer
+    │   ├── MissedError                  a listener has missed messages of a run
     │   ├── FaultError                   a participant reported that it cannot go on
     │   └── SimulationError              numerical trouble: NaN, singular inertia, step underflow
     ├── MismatchError                5   what was recorded does not come out again
@@ -84,6 +85,10 @@ class LostError(ParticipantError):
 
 class AnswerTimeoutError(ParticipantError):
     """A participant is alive but did not answer in time."""
+
+
+class MissedError(ParticipantError):
+    """A listener has missed messages of a run."""
 
 
 class FaultError(ParticipantError):

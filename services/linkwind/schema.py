@@ -24,6 +24,7 @@ def _classes() -> dict[str, Any]:
         pool.Add(file)
     names = (
         "MotionStep", "WrenchStep", "Motion", "Control", "FlowFrame", "Checkpoint", "State", "Step", "Timing",
+        "Description", "Ending", "Playback",
     )  # fmt: skip
     return {
         name: message_factory.GetMessageClass(pool.FindMessageTypeByName(f"linkwind.v1.{name}"))

@@ -35,11 +35,25 @@ def test_what_it_tells(logged):
     assert log.final_state_sha256 == "cd" * 32
     assert log.metadata["tables_sha256"] == "ab" * 32
     info = log.info._asdict()
-    assert list(info) == ["messages", "topics", "steps", "complete", "scenario", "versions"]
+    assert list(info) == ["messages", "topics", "steps", "complete", "scenario", "versions", "missed"]
+    assert info["missed"] == {}
     assert info["messages"] == len(messages)
     topics = dict.fromkeys(["/motion", "/wrench/aero", "/state", "/step", "/timing"], 50)
     assert (info["topics"], info["scenario"]) == (topics, "two_link")
     json.dumps(info)
+
+
+def test_messages_from_a_time_on(logged):
+    """What is before may be left out, nothing behind; in a damaged file no header of a chunk is believed."""
+    path, _, messages = logged
+    log = open_log(path)
+    t = 30 * 1_000_000
+    behind = [message for message in log.messages() if message[2] >= t]
+    assert [m for m in log.messages(start_ns=t) if m[2] >= t] == behind
+    assert len(list(log.messages(start_ns=t))) < len(messages)
+    cut = path.with_name("cut.mcap")
+    cut.write_bytes(path.read_bytes()[:-100])
+    assert list(open_log(cut).messages(start_ns=t)) == list(log.messages())
 
 
 def test_raw_messages_in_order(logged):

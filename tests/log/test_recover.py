@@ -159,7 +159,7 @@ def test_a_full_disk_leaves_no_half_file(logged, tmp_path, monkeypatch):
     def full(*arguments):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("linkwind.log.recover.Writer.add_message", full)
+    monkeypatch.setattr("linkwind.log.copies.Writer.add_message", full)
     with pytest.raises(LogError, match="No space left"):
         recover(path, tmp_path / "new.mcap")
     assert not (tmp_path / "new.mcap").exists()

@@ -22,6 +22,8 @@ from linkwind.schema import MESSAGES
 
 GOLDEN = Path(__file__).parents[2] / "schemas" / "golden"
 
+ABOUT = {"name": "linkwind", "entries": [{"key": "run", "value": "golden"}]}
+
 
 def numbers(count: int, start: float) -> list[float]:
     """Distinct numbers, none of them exact in binary, one negative zero."""
@@ -47,6 +49,9 @@ def vectors() -> dict[str, tuple[str, dict[str, Any]]]:
         "flow_frame": ("FlowFrame", flow_frame()),
         "checkpoint": ("Checkpoint", checkpoint()),
         "welcome_resume": ("Control", {"welcome": welcome()}),
+        "description": ("Description", {"run": "golden", "scenarioJson": "{}", "records": [ABOUT]}),
+        "ending": ("Ending", {"records": [ABOUT], "counts": [{"topic": "/motion", "messages": "1202"}]}),
+        "playback_seek": ("Playback", {"paused": True, "timeNs": "120000000"}),
         "hello": (
             "Control",
             {"hello": {"name": "aero", "schemaSha256": "00", "version": "0.1.0", "instance": "i"}},

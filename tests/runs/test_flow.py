@@ -23,6 +23,7 @@ from linkwind.log.writer import LogWriter
 from linkwind.mechanism import build
 from linkwind.protocol import ProviderSession
 from linkwind.runs.diff import diff
+from linkwind.runs.playback import Steering
 from linkwind.runs.replay import Selection, replay
 from linkwind.runs.run import run
 from linkwind.runs.verify import scenario_of, verify
@@ -143,7 +144,7 @@ def test_a_difference_of_runs_passes_frames_by(log: Path) -> None:
 def test_a_replay_shows_the_frames_as_they_were_sent(log: Path) -> None:
     endpoint, opened = loopback_endpoint(), open_log(log)
     with closing(Subscriber(endpoint, "linkwind/v1/run/observe/**", enough=4)) as subscriber:
-        replay(opened, Selection(0.0), listen=[endpoint], connect=[])
+        replay(opened, Selection(), listen=[endpoint], connect=[], steering=Steering(0.0))
         assert subscriber.done.wait(60.0)
     assert {key for key, _ in subscriber.got} == {"linkwind/v1/run/observe/flow/aero"}
     got = [decode(payload, "run", "aero") for _, payload in subscriber.got]

@@ -3,15 +3,31 @@
 A transport moves ``(key, bytes)`` and tells who is there; it knows no message but Fault. Keys are
 ``linkwind/v1/<run>/motion``, ``…/wrench/<provider>``, ``…/observe/flow/<provider>``,
 ``…/observe/checkpoint/<provider>``, ``…/control/<provider>``, ``…/refusal``, ``…/fault`` and
-``…/alive/<participant>``.
+``…/alive/<participant>``, and for listeners ``…/scenario`` and ``…/log/**``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 PREFIX = "linkwind/v1"
+
+
+class LogStream(Protocol):
+    """The log of a run, as listeners get it; none of them can hold the run up."""
+
+    def wants(self, topic: str) -> bool:
+        """Tell whether somebody listens to a topic."""
+        ...
+
+    def put(self, topic: str, number: int, time_ns: int, payload: bytes) -> None:
+        """Send a message, the ``number``-th of its topic, at its simulation time [ns]."""
+        ...
+
+    def end(self, payload: bytes) -> None:
+        """Send the last message: how the run ended."""
+        ...
 
 
 class DynamicsLink(Protocol):
@@ -57,6 +73,15 @@ class DynamicsLink(Protocol):
 
     def fault(self, payload: bytes) -> None:
         """Tell every provider that the run is over, and why."""
+        ...
+
+    def listeners(self, topics: Sequence[str], description: bytes) -> LogStream | None:
+        """Let others listen to the log from now on; None where there are no others.
+
+        Args:
+            topics: of the log.
+            description: what they are told first.
+        """
         ...
 
     def close(self) -> None:

@@ -75,6 +75,9 @@ class InProcessLink:
         taken, self._checkpoints = self._checkpoints, []
         return taken
 
+    def listeners(self, topics: Sequence[str], description: bytes) -> None:
+        """Nobody else is there."""
+
     def fault(self, payload: bytes) -> None:
         """Nobody is left to be told."""
 

@@ -12,6 +12,7 @@ from linkwind.cli import (
     fmu,
     logs,
     mechanism,
+    record,
     replay,
     report,
     resume,
@@ -41,6 +42,7 @@ logs.register(app)
 verify.register(app)
 view.register(app)
 replay.register(app)
+record.register(app)
 resume.register(app)
 fmu.register(app)
 mechanism.register(app)

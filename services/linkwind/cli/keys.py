@@ -15,7 +15,8 @@ def keys(actions: Mapping[str, Callable[[], None]]) -> Iterator[None]:
     """Call an action at every press of its key within the block; without a terminal there are no keys.
 
     Args:
-        actions: by character. They are called from another thread. Ctrl-C stays what it is.
+        actions: by what the terminal sends for the key. They are called from another thread. Ctrl-C stays
+            what it is.
     """
     if not sys.stdin.isatty():
         yield
@@ -48,6 +49,7 @@ def _listen(terminal: int, wake: int, actions: Mapping[str, Callable[[], None]])
             pressed = os.read(terminal, 100).decode(errors="replace")
         except OSError:  # the terminal was closed
             return
-        for key in pressed:
-            if key in actions:
-                actions[key]()
+        while pressed:
+            key = next((key for key in actions if pressed.startswith(key)), pressed[0])
+            pressed = pressed[len(key) :]
+            actions.get(key, lambda: None)()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from linkwind.log.reader import Log
+    from linkwind.runs.playback import Steering
     from linkwind.runs.replay import Replayed
 
 
@@ -44,6 +46,14 @@ def replay(
         typer.Option(metavar="TOPIC,…", help="Only these topics, such as /motion,/wrench/aero."),
     ] = None,
     loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end, until Ctrl-C.")] = False,
+    paused: Annotated[bool, typer.Option("--paused", help="Pause before the first point.")] = False,
+    remap: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KEY=NEW",
+            help="Another key, for a topic (/motion=lab/motion) or for all that begin with it; repeatable.",
+        ),
+    ] = None,
     listen: ListenOption = None,
     connect: ConnectOption = None,
     substitute: Annotated[
@@ -61,7 +71,9 @@ def replay(
 ) -> None:
     """Publish the messages of a log as the run did, once somebody subscribes.
 
-    On a terminal, the space bar pauses and goes on, a dot lets one step pass, Ctrl-C ends.
+    On a terminal, the space bar pauses and goes on, a dot lets one point pass, + and - change the rate, the
+    arrow keys seek by 1 s, Page Up and Down by 10 s, Home goes to the beginning, Ctrl-C ends. The same can be
+    asked for on the bus, under linkwind/v1/RUN/playback.
 
     With --substitute PROVIDER, that provider is asked again about the recorded motion; it is started here, or
     comes from elsewhere to --listen or --connect. With --substitute dynamics, new dynamics move under the
@@ -84,13 +96,14 @@ def replay(
     from linkwind.credentials import identity_in
     from linkwind.log.reader import open_log
     from linkwind.runs.keeping import terminate_as_interrupt
-    from linkwind.runs.replay import Selection, Steering
+    from linkwind.runs.playback import Steering
+    from linkwind.runs.replay import Selection
     from linkwind.runs.replay import replay as replay_log
 
     opened = open_log(log)
     chosen = tuple(topic for text in topics or () for topic in text.split(","))
-    selection = Selection(rate, start, end, chosen, loop)
-    steering = Steering()
+    selection = Selection(start, end, chosen, [_pair(text) for text in remap or ()])
+    steering = Steering(rate, loop=loop, paused=paused)
     ends = {"listen": listen or ([] if connect else [default_endpoint(tls)]), "connect": connect or []}
     shown = identity_in(tls, "dynamics")
 
@@ -105,7 +118,7 @@ def replay(
         else:
             where = ", ".join([*ends["listen"], *ends["connect"]])
             typer.echo(f"waiting at {where} for a subscriber of linkwind/v1/{opened.run}/**")
-            with keys({" ": steering.toggle, ".": steering.step}):
+            with keys(_actions(steering)):
                 done = _behind_a_bar(opened, selection.start or 0.0, end, job)
     if not done.heard:
         typer.echo("note: at the end nobody listened any more", err=True)
@@ -116,6 +129,27 @@ def replay(
             "" if done.late_ms is None else "; late by {:.2f} ms median, {:.2f} ms p99".format(*done.late_ms)
         )
         typer.echo(f"{done.messages} messages in {done.wall_s:.2f} s{late}")
+
+
+def _pair(text: str) -> tuple[str, str]:
+    """Return both keys of a --remap."""
+    old, equals, new = text.partition("=")
+    if not equals:
+        raise typer.BadParameter(f"--remap: expected KEY=NEW; got {text}")
+    return old, new
+
+
+def _actions(steering: Steering) -> dict[str, Callable[[], None]]:
+    """Return what the keys of a terminal do."""
+    seek = {"\x1b[C": 1.0, "\x1b[D": -1.0, "\x1b[5~": 10.0, "\x1b[6~": -10.0}
+    return {
+        " ": steering.toggle,
+        ".": steering.step,
+        "+": lambda: steering.scale(2.0),
+        "-": lambda: steering.scale(0.5),
+        "\x1b[H": lambda: steering.seek(0),
+        **{key: partial(steering.seek_by, seconds) for key, seconds in seek.items()},
+    }
 
 
 def _behind_a_bar(

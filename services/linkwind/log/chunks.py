@@ -93,6 +93,12 @@ def chunk_records(data: Data, span: Span, *, verified: bool = False) -> bytes | 
     return records if whole else None
 
 
+def latest(data: Data, span: Span) -> int:
+    """Return the latest simulation time in a chunk [ns], as it says itself, without a checksum of that."""
+    _, end, *_ = _CHUNK.unpack_from(data, span.start)
+    return int(end)
+
+
 def _decompressed(content: bytes) -> bytes | None:
     """Return the records of a chunk that another tool compressed; None unless its checksum is right."""
     try:

@@ -25,6 +25,7 @@ SCENARIO = "scenario.json"  # attachment: the resolved scenario
 RUN = "linkwind"  # metadata: run id, bodies, schema hash and what the caller adds
 VERSIONS = "linkwind.versions"  # metadata: versions of the programs, processor
 DIAGNOSTICS = "linkwind.diagnostics"  # metadata: names of each provider's own numbers; missing without any
+HEARD = "linkwind.heard"  # metadata: what a listener has missed; missing in a log of the dynamics' own
 END = "linkwind.end"  # metadata: how the run ended; missing when the writer was killed
 
 # In RUN, where the run does not come from a scenario alone:

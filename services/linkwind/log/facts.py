@@ -38,7 +38,17 @@ class Damage(NamedTuple):
 
 
 class LogInfo(NamedTuple):
-    """What ``linkwind log info`` tells: name of the scenario, messages by topic, and their sum."""
+    """What ``linkwind log info`` tells.
+
+    Attributes:
+        messages: in the log.
+        topics: messages of each topic.
+        steps: communication steps.
+        complete: whether the run came to its end and every message of it is there.
+        scenario: its name.
+        versions: of the programs that made the log, and the processor.
+        missed: messages that a listener has missed, of each topic.
+    """
 
     messages: int
     topics: dict[str, int]
@@ -46,3 +56,4 @@ class LogInfo(NamedTuple):
     complete: bool
     scenario: str
     versions: dict[str, str]
+    missed: dict[str, int]

@@ -49,6 +49,11 @@ class Head:
         """How the run ended, as it was recorded; empty if the writer was killed."""
         return self.record(contents.END)
 
+    @property
+    def heard(self) -> bool:
+        """Whether a listener made the log, rather than the dynamics."""
+        return contents.HEARD in self._contents.metadata
+
     def _check_origin(self) -> None:
         profile = self._contents.profile
         if profile != contents.PROFILE and contents.RUN not in self._contents.metadata:

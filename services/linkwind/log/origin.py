@@ -16,6 +16,8 @@ def origin(log: Log) -> Iterator[str]:
         yield f"resumed after step {metadata[contents.RESUMED_STEP]} of run {metadata['resumed_run']}"
     for step in log.changes:
         yield f"other settings count after step {step}"
+    if log.heard:
+        yield "heard on the bus by linkwind record"
     live = metadata.get(contents.SUBSTITUTED)
     if live == contents.DYNAMICS:
         yield f"live dynamics under the forces recorded in {record}"

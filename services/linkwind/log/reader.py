@@ -22,7 +22,7 @@ from google.protobuf.message import DecodeError
 from linkwind.errors import LogError
 from linkwind.frames import FlowFrame
 from linkwind.log import contents, grid, tables
-from linkwind.log.chunks import ChannelInfo, Data, Message, chunk_records, messages_of
+from linkwind.log.chunks import ChannelInfo, Data, Message, chunk_records, latest, messages_of
 from linkwind.log.facts import Damage, DecodedMessage, LogInfo, RawMessage
 from linkwind.log.head import Head, check_magic
 from linkwind.log.scan import scan
@@ -65,8 +65,10 @@ class Log(Head):
         )
         return known
 
-    def _messages(self, wanted: Container[int] | None = None) -> Iterator[Message]:
+    def _messages(self, wanted: Container[int] | None = None, start_ns: int = 0) -> Iterator[Message]:
         for chunk in self._contents.chunks:
+            if self._contents.verified and latest(self._data, chunk) < start_ns:
+                continue
             records = chunk_records(self._data, chunk, verified=self._contents.verified)
             if records is not None:  # they were read before
                 yield from messages_of(records, self.channels, wanted)
@@ -87,21 +89,24 @@ class Log(Head):
         """What ``linkwind log info`` tells."""
         scenario = json.loads(self.scenario_json)["name"]
         topics = dict(self.topics)
-        return LogInfo(sum(topics.values()), topics, self.steps, self.complete, scenario, self.versions)
+        missed = {topic: int(count) for topic, count in self.record(contents.HEARD).items()}
+        return LogInfo(
+            sum(topics.values()), topics, self.steps, self.complete, scenario, self.versions, missed
+        )
 
     def raw(self, *topics: str) -> Iterator[RawMessage]:
         """Iterate over the readable messages in the order of logging: of ``topics``, or all."""
         for channel, _, time_ns, payload in self.messages(*topics):
             yield RawMessage(self.channels[channel].topic, time_ns, payload)
 
-    def messages(self, *topics: str) -> Iterator[Message]:
+    def messages(self, *topics: str, start_ns: int = 0) -> Iterator[Message]:
         """Iterate like :meth:`raw` over channel, number, simulation time [ns] and payload.
 
-        The number counts the messages of a channel from 1, in a damaged log those that are lost as well.
+        The number counts the messages of a channel from 1, in a damaged log those that are lost as well. What
+        is before simulation time ``start_ns`` [ns] may be left out.
         """
-        return self._messages(
-            {n for n, channel in self.channels.items() if not topics or channel.topic in topics}
-        )
+        wanted = {n for n, channel in self.channels.items() if not topics or channel.topic in topics}
+        return self._messages(wanted, start_ns)
 
     def decoded(self, *topics: str) -> Iterator[DecodedMessage]:
         """Iterate like :meth:`raw` over parsed messages of ``linkwind.v1``; pictures are left out.

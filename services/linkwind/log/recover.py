@@ -9,13 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO, NamedTuple
 
-from mcap.writer import CompressionType, Writer
-
 from linkwind.errors import LogError
 from linkwind.log import contents
+from linkwind.log.copies import CopyWriter
 from linkwind.log.reader import Log, open_log
 
-CHUNK_SIZE = 256 * 1024  # bytes, as the log of a run has them
 STRIDE = 10_000  # messages between two words about progress
 
 
@@ -67,34 +65,22 @@ def recover(
 
 
 def _write(log: Log, file: IO[bytes], progress: Callable[[int], None]) -> int:
-    writer = Writer(file, chunk_size=CHUNK_SIZE, compression=CompressionType.NONE, enable_data_crcs=True)
-    writer.start(profile=contents.PROFILE, library="linkwind log recover")
-    for name in (contents.RUN, contents.VERSIONS, contents.DIAGNOSTICS):
+    copy = CopyWriter(file, "linkwind log recover")
+    for name in (contents.RUN, contents.VERSIONS, contents.DIAGNOSTICS, contents.HEARD):
         if record := log.record(name):
-            writer.add_metadata(name, contents.sealed(record))
+            copy.record(name, record)
     if log.has_scenario:
-        writer.add_attachment(0, 0, contents.SCENARIO, "application/json", log.scenario_json.encode())
-    channels = _register(log, writer)
+        copy.scenario(log.scenario_json)
+    channels = {number: copy.channel(*channel) for number, channel in sorted(log.channels.items())}
     count = 0
     for channel, number, time_ns, payload in log.messages():
-        writer.add_message(channels[channel], time_ns, payload, time_ns, number)
+        copy.message(channels[channel], number, time_ns, payload)
         count += 1
         if count % STRIDE == 0:
             progress(count)
-    writer.add_metadata(contents.END, contents.sealed(_end(log)))
-    writer.finish()  # type: ignore[no-untyped-call]
+    copy.record(contents.END, _end(log))
+    copy.finish()
     return count
-
-
-def _register(log: Log, writer: Writer) -> dict[int, int]:
-    """Declare the old file's channels in the new one; return the new numbers by the old ones."""
-    schemas = {schema: 0 for _, schema, _ in log.channels.values() if schema.name}  # 0: no schema
-    for schema in schemas:
-        schemas[schema] = writer.register_schema(*schema)
-    return {
-        number: writer.register_channel(channel.topic, channel.encoding, schemas.get(channel.schema, 0))
-        for number, channel in sorted(log.channels.items())
-    }
 
 
 def _end(log: Log) -> dict[str, str]:

@@ -48,6 +48,9 @@ class LogWriter:
         metadata: what else belongs to the run, such as ``tables_sha256`` and ``library_sha256``.
         flush_interval: wall-clock time [s] after which messages are in the file.
 
+    Attributes:
+        records: metadata written so far, by name.
+
     Raises:
         LogError: the file exists or cannot be made.
     """
@@ -100,8 +103,9 @@ class LogWriter:
             "provider_bodies": json.dumps({name: list(bodies) for name, bodies in provider_bodies.items()}),
             "schema_sha256": schema.SHA256,
         }
-        self._writer.write_metadata(contents.RUN, contents.sealed(record | dict(metadata)))
-        self._writer.write_metadata(contents.VERSIONS, contents.sealed(versions()))
+        self.records: dict[str, dict[str, str]] = {}
+        self._write_record(contents.RUN, record | dict(metadata))
+        self._write_record(contents.VERSIONS, versions())
         self._writer.attach(
             log_time=0,
             create_time=0,
@@ -109,6 +113,10 @@ class LogWriter:
             media_type="application/json",
             data=scenario_json.encode(),
         )
+
+    def _write_record(self, name: str, record: dict[str, str]) -> None:
+        self.records[name] = record
+        self._writer.write_metadata(name, contents.sealed(record))
 
     def _channels(self, providers: Mapping[str, Sequence[str]]) -> None:
         self._opened: list[Any] = []
@@ -193,7 +201,7 @@ class LogWriter:
         """Record the names of the numbers that providers report with their wrenches; none, nothing."""
         record = {provider: json.dumps(list(each)) for provider, each in names.items() if each}
         if record:
-            self._writer.write_metadata(contents.DIAGNOSTICS, contents.sealed(record))
+            self._write_record(contents.DIAGNOSTICS, record)
 
     def flush(self) -> None:
         """Bring every message so far into the file, where a killed process leaves it.
@@ -233,7 +241,7 @@ class LogWriter:
             record["final_state_sha256"] = final_state_sha256
         if error is not None:
             record |= {"error": type(error).__name__, "text": str(error)}
-        self._writer.write_metadata(contents.END, contents.sealed(record))
+        self._write_record(contents.END, record)
         self._writer.close()
         for channel in self._opened:
             channel.close()

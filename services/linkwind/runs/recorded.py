@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from google.protobuf.message import DecodeError
 
@@ -131,6 +131,9 @@ class RecordedWrenches:
     def checkpoints(self) -> list[tuple[str, bytes]]:
         """Nobody is there to keep any."""
         return []
+
+    def listeners(self, topics: Sequence[str], description: bytes) -> None:
+        """Nobody else is there."""
 
     def fault(self, payload: bytes) -> None:
         """Nobody is there to be told."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -12,9 +13,11 @@ from linkwind import aero
 from linkwind.bus.base import DynamicsLink
 from linkwind.credentials import Identity
 from linkwind.dynamics import methods
+from linkwind.dynamics.published import PublishedLog, topics
 from linkwind.dynamics.recorder import MessageLog, Recorder, tables_sha256
 from linkwind.dynamics.service import DynamicsService, Result
 from linkwind.errors import InputError, ScenarioError
+from linkwind.listening import description
 from linkwind.log.writer import LogWriter
 from linkwind.mechanism import build
 from linkwind.native.library import library_sha256
@@ -168,13 +171,26 @@ def drive(
     """Run the service over an open end of the bus, close that, and keep the log; see :func:`run`."""
 
     def job(writer: LogWriter) -> Result:
-        recorder = Recorder(beginning.log(writer), service.scenario, service.mechanism, service.multibody)
-        result = service.run(beginning.link(link), recorder, progress, poll)
-        writer.close(final_state_sha256=result.final_state_sha256)
+        with _heard(beginning.log(writer), writer, link, service) as log:
+            recorder = Recorder(log, service.scenario, service.mechanism, service.multibody)
+            result = service.run(beginning.link(link), recorder, progress, poll)
+            writer.close(final_state_sha256=result.final_state_sha256)
         return result
 
     kept = keep(folder, link, lambda path: _new_log(path, service, beginning.metadata), job)
     return Outcome(service.scenario.name, kept.result, kept.log, kept.report, kept.report_trouble)
+
+
+def _heard(
+    log: MessageLog, writer: LogWriter, link: DynamicsLink, service: DynamicsService
+) -> AbstractContextManager[MessageLog]:
+    """Return a log that others on the bus can listen to, if it is one from the beginning."""
+    session = service.session
+    if log is not writer:
+        return nullcontext(log)
+    about = description(session.run, service.scenario.to_json(), writer.records)
+    stream = link.listeners(topics(list(session.providers)), about)
+    return nullcontext(log) if stream is None else PublishedLog(writer, stream, session.run)
 
 
 def _new_log(path: Path, service: DynamicsService, metadata: Mapping[str, str]) -> LogWriter:

@@ -6,6 +6,7 @@ who is there. Multicast, gossip and shared memory are off: endpoints are explici
 
 from linkwind.bus.zenoh.diagnosis import check_trust
 from linkwind.bus.zenoh.dynamics import SPIN, ZenohDynamicsLink
+from linkwind.bus.zenoh.listener import ZenohListener
 from linkwind.bus.zenoh.player import ZenohPlayer
 from linkwind.bus.zenoh.provider import ZenohProviderLink
 from linkwind.bus.zenoh.router import ZenohRouter
@@ -16,6 +17,7 @@ __all__ = [
     "OBSERVER",
     "SPIN",
     "ZenohDynamicsLink",
+    "ZenohListener",
     "ZenohPlayer",
     "ZenohProviderLink",
     "ZenohRouter",

@@ -41,13 +41,14 @@ def of_hub(providers: Iterable[str], trusted: str) -> dict[str, Any]:
         _rule("watch", PRESENCE, ["ingress"], f"{RUN}/alive/*"),
         _rule("follow", ["declare_subscriber"], ["ingress"], f"{RUN}/motion", f"{RUN}/fault"),
         _rule("read", ["declare_subscriber"], ["ingress"], EVERYTHING),
+        _rule("listen", ["query"], ["ingress"], f"{RUN}/scenario", f"{RUN}/playback"),
         # Whoever has a certificate that means nothing here can learn just that.
         _rule("ask why", ["query"], ["ingress"], f"{RUN}/refusal"),
         _rule("say why", ["reply", "declare_queryable"], ["egress"], f"{RUN}/refusal"),
     ]
     policies = [
         _policy([trusted], ["hear", "trust"]),
-        _policy([OBSERVER], ["hear", "read", "watch"]),
+        _policy([OBSERVER], ["hear", "read", "watch", "listen"]),
         _policy(["anybody"], ["ask why", "say why"]),
     ]
     for name in providers:

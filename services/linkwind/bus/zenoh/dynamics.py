@@ -15,6 +15,7 @@ from linkwind.bus.base import PREFIX
 from linkwind.bus.zenoh.access import of_hub
 from linkwind.bus.zenoh.endpoint import Endpoint
 from linkwind.bus.zenoh.session import DYNAMICS, LEASE, Security, key_segment
+from linkwind.bus.zenoh.stream import ZenohLogStream
 from linkwind.credentials import ROUTER, Identity
 from linkwind.errors import AnswerTimeoutError, LinkwindError, LostError
 
@@ -143,6 +144,10 @@ class ZenohDynamicsLink(Endpoint):
             self._posted_at = time.monotonic()
             self._resend_at = self._posted_at + FIRST_RESEND
         self._outgoing.put(motion)
+
+    def listeners(self, topics: Sequence[str], description: bytes) -> ZenohLogStream:
+        """Let others listen to the log; see :class:`~linkwind.bus.base.DynamicsLink`."""
+        return ZenohLogStream(self._session, self._exchanging.run, topics, description, drop=True)
 
     def fault(self, payload: bytes) -> None:
         """Tell every provider that the run is over, and why."""

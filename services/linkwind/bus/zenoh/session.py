@@ -90,7 +90,7 @@ def _open(
         **place,
         "listen/endpoints": list(listen),
         "connect/endpoints": list(connect),
-        "connect/retry": {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 2},
+        "connect/retry": {"period_init_ms": 50, "period_max_ms": 100, "period_increase_factor": 2},
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
         "transport/shared_memory/enabled": False,
@@ -98,6 +98,7 @@ def _open(
         "transport/unicast/open_timeout": int(LEASE * 1000),
         "transport/link/tx/lease": int(LEASE * 1000),
         "transport/link/tx/keep_alive": 4,
+        "transport/link/tx/queue/size/data_low": 16,  # of 64 kB, for listeners that are behind for a moment
         "low_pass_filter": [
             {
                 "id": "requests",

@@ -1,0 +1,78 @@
+"""A log that listeners on the bus get a copy of, message by message."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from types import TracebackType
+
+from linkwind.bus.base import LogStream
+from linkwind.frames import FlowFrame
+from linkwind.listening import ending
+from linkwind.log.contents import CHECKPOINT, DIAGNOSTICS, END, FLOW, MOTION, STATE, STEP, TIMING, WRENCH
+from linkwind.log.writer import LogWriter
+
+
+def topics(providers: Sequence[str]) -> list[str]:
+    """Return every topic that a run may have messages of."""
+    kinds = (WRENCH, FLOW, CHECKPOINT)
+    return [MOTION, STATE, STEP, TIMING, *(kind + name for name in providers for kind in kinds)]
+
+
+class PublishedLog:
+    """Writes and publishes (:class:`~linkwind.dynamics.recorder.MessageLog`); tells at last how it ended.
+
+    An exception that leaves the block ends the log with it.
+    """
+
+    def __init__(self, log: LogWriter, stream: LogStream, run: str) -> None:
+        """Write to ``log``, publish on ``stream``."""
+        self._log, self._stream, self._run = log, stream, run
+        self._numbers: Counter[str] = Counter()
+        self.scene, self.diagnostics = log.scene, log.diagnostics
+
+    def motion(self, payload: bytes, time_ns: int) -> None:
+        self._log.motion(payload, time_ns)
+        self._publish(MOTION, payload, time_ns)
+
+    def wrench(self, provider: str, payload: bytes, time_ns: int) -> None:
+        self._log.wrench(provider, payload, time_ns)
+        self._publish(WRENCH + provider, payload, time_ns)
+
+    def state(self, payload: bytes, time_ns: int) -> None:
+        self._log.state(payload, time_ns)
+        self._publish(STATE, payload, time_ns)
+
+    def step(self, payload: bytes, time_ns: int) -> None:
+        self._log.step(payload, time_ns)
+        self._publish(STEP, payload, time_ns)
+
+    def timing(self, payload: bytes, time_ns: int) -> None:
+        self._log.timing(payload, time_ns)
+        self._publish(TIMING, payload, time_ns)
+
+    def checkpoint(self, provider: str, payload: bytes, time_ns: int) -> None:
+        self._log.checkpoint(provider, payload, time_ns)
+        self._publish(CHECKPOINT + provider, payload, time_ns)
+
+    def frame(self, provider: str, frame: FlowFrame) -> None:
+        self._log.frame(provider, frame)
+        topic = FLOW + provider
+        wanted = self._stream.wants(topic)
+        payload = frame.encode(self._run, provider, self._numbers[topic] + 1) if wanted else b""
+        self._publish(topic, payload, frame.time_ns)
+
+    def _publish(self, topic: str, payload: bytes, time_ns: int) -> None:
+        self._numbers[topic] += 1
+        if self._stream.wants(topic):
+            self._stream.put(topic, self._numbers[topic], time_ns, payload)
+
+    def __enter__(self) -> PublishedLog:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._log.close(error=error)
+        later = {name: self._log.records[name] for name in (DIAGNOSTICS, END) if name in self._log.records}
+        self._stream.end(ending(later, self._numbers))
