@@ -28,7 +28,7 @@ TYPES = {
     "planar": "planar",
     "free": "floating",
 }
-FAR = "1e6"  # m: a prismatic joint must have limits
+FAR = 1e6  # m: a prismatic joint must have limits
 Z = np.array([0.0, 0.0, 1.0])
 
 
@@ -91,27 +91,32 @@ def _joints(scenario: Scenario, mechanism: Mechanism, index: int) -> Iterator[ET
     name, kind = mechanism.joints[index], list(JOINT_TYPES)[t.joint_type[index]]
     if kind != "spherical":
         damping = float(t.damping[t.v_index[index]]) if kind in ("revolute", "prismatic") else 0.0
-        yield _joint(name, TYPES[kind], carrier, child, origin, t.child_rotation[index] @ Z, damping)
+        stop = next((joint.stop for joint in scenario.joints if joint.name == name), None)
+        urdf_type = "revolute" if stop and kind == "revolute" else TYPES[kind]
+        axis = t.child_rotation[index] @ Z
+        yield _joint(name, urdf_type, carrier, child, origin, axis, damping, stop or (-FAR, FAR))
         return
     for axis, letter in zip(np.eye(3)[:2], "xy", strict=True):
         between = f"{name}_{letter}_link"
         yield ET.Element("link", name=between)
-        yield _joint(f"{name}_{letter}", "continuous", carrier, between, origin, axis, 0.0)
+        yield _joint(f"{name}_{letter}", "continuous", carrier, between, origin, axis)
         carrier, origin = between, {"xyz": "0 0 0", "rpy": "0 0 0"}
-    yield _joint(f"{name}_z", "continuous", carrier, child, origin, Z, 0.0)
+    yield _joint(f"{name}_z", "continuous", carrier, child, origin, Z)
 
 
 def _joint(
-    name: str, kind: str, parent: str, child: str, origin: dict[str, str], axis: Array, damping: float
-) -> ET.Element:
+    name: str, kind: str, parent: str, child: str, origin: dict[str, str], axis: Array, damping: float = 0.0,
+    stop: tuple[float, float] = (-FAR, FAR),
+) -> ET.Element:  # fmt: skip
     joint = ET.Element("joint", name=name, type=kind)
     ET.SubElement(joint, "origin", origin)
     ET.SubElement(joint, "parent", link=parent)
     ET.SubElement(joint, "child", link=child)
-    if kind in ("continuous", "prismatic", "planar"):
+    if kind in ("continuous", "revolute", "prismatic", "planar"):
         ET.SubElement(joint, "axis", xyz=_numbers(axis))
-    if kind == "prismatic":
-        ET.SubElement(joint, "limit", lower=f"-{FAR}", upper=FAR, effort=FAR, velocity=FAR)
+    if kind in ("revolute", "prismatic"):
+        low, high = map(repr, stop)
+        ET.SubElement(joint, "limit", lower=low, upper=high, effort=repr(FAR), velocity=repr(FAR))
     if damping:
         ET.SubElement(joint, "dynamics", damping=repr(damping))
     return joint
@@ -182,6 +187,11 @@ def _of_surroundings(scenario: Scenario) -> Iterator[Remark]:
         yield Remark(
             "gravities", "the format has none; most programs take -9.81 along z", f"[{gravity}] m/s²"
         )
+    for joint in scenario.joints:
+        if joint.restitution:
+            yield Remark("restitutions", "the format has none", joint.name)
+    for event in scenario.events:
+        yield Remark("events", "the format has none", event.name)
     for provider in scenario.providers:
         if provider.model != "none":
             yield Remark("force models", "the format has none", f"{provider.name} ({provider.model})")

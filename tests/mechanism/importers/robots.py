@@ -36,7 +36,7 @@ def random_urdf(seed: int, n: int = 10, roots: str = "") -> str:
             kind = TYPES[(i + seed) % 4]
             parts.append(
                 f'<joint name="j{i}" type="{kind}">{origin(rng)}{ends(f"l{rng.integers(i)}", i)}'
-                f'<axis xyz="{numbers(unit(rng))}"/><limit lower="-1" upper="1" effort="1" velocity="1"/>'
+                f'<axis xyz="{numbers(unit(rng))}"/><limit lower="-9" upper="9" effort="1" velocity="1"/>'
                 f'<dynamics damping="{float(rng.uniform(0, 0.3))!r}"/></joint>'
             )
     return f'<robot name="random">{"".join(parts)}</robot>'

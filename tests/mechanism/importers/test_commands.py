@@ -31,8 +31,7 @@ def test_import_writes_a_scenario_and_says_what_it_leaves_out(robot):
     assert output.startswith(
         "wrote robot.toml (URDF: 10 bodies, 10 joints); run it with: linkwind run robot.toml\n"
     )
-    assert "  joint limits (4): joints turn and slide without end\n" in output
-    assert "and 1 more" not in output
+    assert "  links merged into the one that they are fixed to (1): fixed to the world\n" in output
     assert load("robot.toml").planar is False
     with pytest.raises(InputError, match=r"robot\.toml: expected a new file; got one that exists"):
         run("import", robot)
@@ -41,9 +40,7 @@ def test_import_writes_a_scenario_and_says_what_it_leaves_out(robot):
 def test_json_and_the_way_back(robot):
     facts = json.loads(run("import", robot, "-o", "a.toml", "--at", "j1=0.5", "--json"))
     assert (facts["file"], facts["kind"], facts["bodies"], facts["joints"]) == ("a.toml", "URDF", 10, 10)
-    limits = next(group for group in facts["left_out"] if group["what"] == "joint limits")
-    assert limits["why"] == "joints turn and slide without end"
-    assert len(limits["items"]) == 4
+    assert facts["left_out"][-1]["items"] == ["world → world"]
     back = json.loads(run("export", "a.toml", "--json"))
     assert (back["file"], back["links"], back["joints"]) == ("a.urdf", 11, 10)
     assert [group["what"] for group in back["left_out"]] == ["starts"]

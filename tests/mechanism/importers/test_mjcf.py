@@ -82,12 +82,19 @@ def test_what_was_left_out_is_named(tmp_path):
     left = {}
     for remark in imported(tmp_path, ROBOT).remarks:
         left.setdefault(remark.what, []).append(remark.item)
-    assert left["joint limits"] == ["hip_y"]
+    assert "joint limits" not in left
     assert left["armatures"] == ["hip_y"]
     assert left["joint frictions"] == ["knee"]
     assert left["equality constraints"] == ["geared"]
     assert (left["tendons"], left["actuators"], left["sensors"]) == (["cord"], ["m"], ["gyro"])
     assert left["contacts"] == ["world", "trunk", "thigh", "shin", "foot", "toe"]
+
+
+def test_ranges_become_stops(tmp_path):
+    """They are from the joint's zero, which is ref."""
+    stops = {joint.name: joint.stop for joint in imported(tmp_path, ROBOT).scenario.joints}
+    assert stops.pop("hip_y") == pytest.approx(np.radians([-40.0, 20.0]))
+    assert set(stops.values()) == {None}
 
 
 def test_warnings_of_mujoco_are_passed_on_and_leave_no_file(tmp_path, monkeypatch):

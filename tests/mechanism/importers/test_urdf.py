@@ -122,11 +122,13 @@ def test_there_and_back_again(tmp_path, seed, roots):
     once = imported(tmp_path, random_urdf(seed, roots=roots)).scenario
     exported = export_urdf(once)
     again = imported(tmp_path, exported.text).scenario
-    assert {joint.name for joint in again.joints} == {joint.name for joint in once.joints}
+    assert {(j.name, j.stop) for j in again.joints} == {(j.name, j.stop) for j in once.joints}
     cores = [Multibody(build(scenario).tables) for scenario in (once, again)]
     rng = np.random.default_rng(seed)
     state = cores[0].initial_state(np.array([*build(once).q0]), rng.normal(size=cores[0].nv))
-    other = cores[1].initial_state(np.array([*build(again).q0]), state[cores[0].nq : -1])
+    other = cores[1].initial_state(
+        np.array([*build(again).q0]), state[cores[0].nq : cores[0].nq + cores[0].nv]
+    )
     if roots == PLANAR:
         other = state.copy()  # its plane has axes of its own, turned about the normal, and so have q and v
         other[cores[0].nq : cores[0].nq + 2] = _turned_in_plane(build(once), build(again), state, cores[0].nq)
@@ -249,7 +251,7 @@ def test_what_was_left_out_is_at_the_top_of_the_file(tmp_path):
     for line in (
         "transmissions (1): joints have no motors",
         "mimic joints (1): they move freely",
-        "joint limits (1): joints turn and slide without end",
+        "joint limits (1): the start is not between them; see --at",
         "joint frictions (1): dry friction is not modelled",
         "gazebo extensions (1): they are for another program",
         "collision shapes (1): bodies do not touch",
@@ -299,3 +301,13 @@ def test_a_spherical_joint_goes_out_as_three(tmp_path):
         found.append(core.evaluate(state, np.zeros((core.n, 6))).acceleration)
     keep = [i for i, body in enumerate(again.bodies) if body.mass]
     np.testing.assert_allclose(found[1][keep], found[0], atol=1e-11 * np.abs(found[0]).max())
+
+
+def test_limits_become_stops(tmp_path):
+    """Those that the start is between; a continuous joint has none."""
+    text = random_urdf(3, n=4).replace('lower="-9"', 'lower="0.5"', 1)
+    names = [f"j{i}" for i in range(1, 4)]
+    got = imported(tmp_path, text)
+    stops = {joint.name: joint.stop for joint in got.scenario.joints if joint.name in names}
+    assert stops == {"j1": None, "j2": None, "j3": (-9.0, 9.0)}
+    assert [remark.item for remark in got.remarks if remark.what == "joint limits"] == ["j1 (0.5 to 9)"]

@@ -13,7 +13,7 @@ from linkwind import __version__
 from linkwind.errors import InputError, SimulationError
 from linkwind.mechanism import build
 from linkwind.mechanism.importers import mjcf, urdf, xmltree
-from linkwind.mechanism.importers.configuration import parse
+from linkwind.mechanism.importers.configuration import drop_stops, parse
 from linkwind.mechanism.importers.model import Model
 from linkwind.mechanism.importers.settle import settle
 from linkwind.mechanism.importers.stiffness import stiff_joints
@@ -59,6 +59,7 @@ def import_file(
     model = _read(path, base)
     settle(model, path, repair)
     start = parse(at, model)
+    drop_stops(model, start)
     welds = [closure.name for closure in model.closures if closure.type == "fixed"]
     if start and welds:
         raise InputError(

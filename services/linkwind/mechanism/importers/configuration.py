@@ -34,6 +34,18 @@ def parse(arguments: Sequence[str], model: Model) -> dict[str, float]:
     return stated
 
 
+def drop_stops(model: Model, stated: Mapping[str, float]) -> None:
+    """Leave out stops that the start is not between."""
+    for part in model.parts:
+        joint, q = part.joint, stated.get(part.joint.name, 0.0)
+        if joint.stop is None or (joint.stop[0] <= q <= joint.stop[1] and joint.stop[0] < joint.stop[1]):
+            continue
+        low, high = joint.stop
+        item = f"{joint.name} ({low:g} to {high:g})"
+        model.leave_out("joint limits", "the start is not between them; see --at", [item])
+        joint.stop = None
+
+
 def _unknown(name: str, known: Sequence[str]) -> str:
     near = nearest(name, known)
     return (

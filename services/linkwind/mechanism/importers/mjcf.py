@@ -99,6 +99,9 @@ class _Reader:
         joint.stiffness = float(m.jnt_stiffness[index]) * (not self._off("SPRING"))
         if kind in ("revolute", "prismatic"):
             joint.axis = axis
+            zero = float(m.qpos0[m.jnt_qposadr[index]])
+            low, high = (float(end) - zero for end in m.jnt_range[index])
+            joint.stop = (low, high) if m.jnt_limited[index] else None
         if joint.stiffness:
             joint.rest = self._rest(index, kind)
         return joint
@@ -201,7 +204,8 @@ class _Reader:
         joints = [self._name("JOINT", j) for j in range(m.njnt)]
         of = [joints[j] for j in m.dof_jntid]
         bodies = [self._name("BODY", b) for b in range(m.nbody)]
-        out("joint limits", "joints turn and slide without end", _each(joints, m.jnt_limited))
+        cones = np.array(m.jnt_limited) * (np.array(m.jnt_type) == 1)  # of balls
+        out("joint limits", "spherical joints have no end", _each(joints, cones))
         out("joint frictions", "dry friction is not modelled", _each(of, m.dof_frictionloss))
         out("armatures", "rotors have no inertia: the motion is another", _each(of, m.dof_armature))
         out(

@@ -44,6 +44,7 @@ class Joint:
         axis: shape (3,).
         stiffness, damping: one number, or one for each degree of freedom.
         rest: joint coordinates where the spring is relaxed, or None for the zero.
+        stop: lowest and highest coordinate, or None where there is no end.
     """
 
     name: str
@@ -53,6 +54,7 @@ class Joint:
     stiffness: float | list[float] = 0.0
     damping: float | list[float] = 0.0
     rest: list[float] | None = None
+    stop: tuple[float, float] | None = None
 
 
 @dataclass

@@ -133,6 +133,8 @@ def _joint(part: Part, name: str, child: str, parent: str, centre: Array) -> Ite
     if joint.rest is not None:
         single = len(joint.rest) == 1
         yield f"rest = {_number(joint.rest[0]) if single else _row(np.array(joint.rest))}"
+    if joint.stop is not None:
+        yield f"stop = {_row(np.array(joint.stop))}    # {'rad' if turns else 'm'}"
     if np.any(joint.damping):
         yield f"damping = {_any(joint.damping)}    # {'N·m·s/rad' if turns else 'N·s/m'}"
 

@@ -158,6 +158,9 @@ def _joint(element: Element, frame: Pose) -> Joint:
         joint.axis = frame.rotation @ direction
     if joint.type in ("revolute", "prismatic"):
         joint.damping = damping
+    limit = element.first("limit")
+    if limit is not None and kind in ("revolute", "prismatic"):
+        joint.stop = limit.number("lower", 0.0), limit.number("upper", 0.0)
     return joint
 
 
@@ -232,8 +235,6 @@ def _note_left_out(model: Model, root: Element) -> None:
 
 def _note_of_joint(model: Model, joint: Element) -> None:
     name, kind = joint.text("name"), joint.text("type")
-    if joint.first("limit") and kind in ("revolute", "prismatic"):
-        model.leave_out("joint limits", "joints turn and slide without end", [name])
     for dynamics in joint.all("dynamics"):
         if dynamics.number("friction", 0.0):
             model.leave_out("joint frictions", "dry friction is not modelled", [name])
