@@ -59,8 +59,12 @@ LW_INLINE lw_spatial lw_spatial_times(const lw_inertia6 *i, lw_spatial a) {
     return f;
 }
 
-/* lw_maximal.c: let the tree's joints be what the events of the bodies have made of them. */
+/* lw_maximal.c: force and torque of a closure at its point on the second body. */
+lw_spatial lw_maximal_closure_reaction(const lw_maximal *maximal, const lw_multibody *bodies, int32_t closure);
+/* lw_release.c: let the tree's joints be what the events of the bodies have made of them; what an event of the
+ * tree compares with its threshold. */
 void lw_maximal_follow(lw_maximal *maximal, const lw_multibody *bodies);
+double lw_maximal_occasion(lw_multibody *bodies, int32_t event, const double *y, double time);
 /* Does a joint act, or has it been released? */
 LW_INLINE int lw_constraint_acts(const lw_maximal *m, const lw_constraint *c) {
     if (!c->carries) return !m->tree->closure[c->item].released;

@@ -8,11 +8,6 @@
 static const lw_spatial none = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
 static const lw_inertia6 no_inertia;
 
-void lw_maximal_follow(lw_maximal *m, const lw_multibody *mb) {
-    size_t bytes = (size_t)mb->events * sizeof(double);
-    if (memcmp(m->tree->happened, mb->happened, bytes)) lw_modes(m->tree, mb->happened);
-}
-
 /* ---- accelerations ---- */
 
 static lw_spatial own_force(const lw_multibody *mb, const lw_link *l, const double *wrench) {
@@ -198,6 +193,7 @@ void lw_maximal_attach(void *memory, lw_multibody *bodies, lw_multibody *tree, i
     m->formulation.settle = lw_maximal_settle;
     m->formulation.spring_energy = spring_energy;
     m->formulation.damper_power = damper_power;
+    m->formulation.occasion = lw_maximal_occasion;
     m->tree = tree;
     m->n = tree->n;
     m->constraints = (int32_t)c.constraints;
@@ -219,18 +215,22 @@ void lw_maximal_attach(void *memory, lw_multibody *bodies, lw_multibody *tree, i
     bodies->formulation = &m->formulation;
 }
 
+lw_spatial lw_maximal_closure_reaction(const lw_maximal *m, const lw_multibody *bodies, int32_t closure) {
+    const lw_constraint *c = &m->constraint[m->constraints - m->tree->closures + closure];
+    lw_spatial f = none;
+    for (int32_t r = c->row; r < c->row + c->rows; ++r) f = lw_spatial_axpy(m->multiplier[r], m->row[r].on[1], f);
+    lw_vec3 arm = c->point[1];
+    if (c->link[1] >= 0) arm = lw_mat_vec(bodies->link[c->link[1]].rotation, arm);
+    f.angular = lw_sub(f.angular, lw_cross(arm, f.linear));
+    return f;
+}
+
 void lw_maximal_closure_reactions(const lw_multibody *bodies, double *reaction) {
     const lw_maximal *m = (const lw_maximal *)bodies->formulation;
-    for (int32_t i = 0; i < m->constraints; ++i) {
-        const lw_constraint *c = &m->constraint[i];
-        if (c->carries) continue;
-        lw_spatial f = none;
-        for (int32_t r = c->row; r < c->row + c->rows; ++r)
-            f = lw_spatial_axpy(m->multiplier[r], m->row[r].on[1], f);
-        lw_vec3 arm = c->point[1];
-        if (c->link[1] >= 0) arm = lw_mat_vec(bodies->link[c->link[1]].rotation, arm);
-        lw_store3(reaction + 6 * c->item, f.linear);
-        lw_store3(reaction + 6 * c->item + 3, lw_sub(f.angular, lw_cross(arm, f.linear)));
+    for (int32_t i = 0; i < m->tree->closures; ++i) {
+        lw_spatial f = lw_maximal_closure_reaction(m, bodies, i);
+        lw_store3(reaction + 6 * i, f.linear);
+        lw_store3(reaction + 6 * i + 3, f.angular);
     }
 }
 

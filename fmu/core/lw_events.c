@@ -129,9 +129,11 @@ static int needs_forces(const lw_multibody *mb) {
     return 0;
 }
 
-static double plain_indicator(const lw_multibody *mb, const lw_event *e, const double *y, double time) {
+static double plain_indicator(lw_multibody *mb, const lw_event *e, const double *y, double time) {
     double value = time;
     if (e->occasion == LW_ON_COMMAND) return 0.0;
+    if (mb->formulation)
+        return e->side * (mb->formulation->occasion(mb, (int32_t)(e - mb->event), y, time) - e->threshold);
     const lw_link *l = e->joint < mb->n ? link_of(mb, e->joint) : NULL;
     if (e->occasion == LW_ON_POSITION || e->occasion == LW_ON_SPEED) {
         if (l->type != l->built) return never;

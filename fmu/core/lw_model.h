@@ -89,6 +89,7 @@ typedef struct {
     int (*settle)(lw_multibody *multibody, double *q, double *v, lw_fault *fault); /* after every substep */
     double (*spring_energy)(const lw_multibody *multibody, const double *q);
     double (*damper_power)(const lw_multibody *multibody, const double *v);
+    double (*occasion)(lw_multibody *multibody, int32_t event, const double *y, double time); /* seen from it */
 } lw_formulation;
 
 struct lw_multibody {

@@ -23,6 +23,7 @@ _attach = declare("lw_maximal_attach", [_pointer] * 3 + [ctypes.c_int32, ctypes.
 _start = declare("lw_maximal_start", [_pointer] * 3, None)
 _closure_reactions = declare("lw_maximal_closure_reactions", [_pointer] * 2, None)
 _coordinates = declare("lw_maximal_coordinates", [_pointer] * 4, None)
+_PLACES = [OCCASIONS[name] for name in ("position", "speed", "distance")]  # no forces are needed for these
 _TURNING = (JOINT_TYPES["revolute"], JOINT_TYPES["planar"])
 
 
@@ -65,8 +66,7 @@ class Cfe(Multibody):
             time: in which Baumgarte's method undoes what a joint is open [s]: it goes back as exp(-t/time).
 
         Raises:
-            MechanismError: a table has a wrong shape or a wrong value, or an event is none that this method
-                knows: release of a joint that carries a body, on command, at a time, on a force or torque.
+            MechanismError: a table has a wrong shape or a wrong value, or an event is no release.
         """
         self.tree = Multibody(tables, bodies, closures, events, forces)
         _check_events(self.tree)
@@ -102,13 +102,10 @@ class Cfe(Multibody):
 
 
 def _check_events(tree: Multibody) -> None:
-    t, occasions = tree.tables, [OCCASIONS[name] for name in ("command", "time", "force", "torque")]
-    carries = (t.event_joint < tree.n) & (t.event_action == ACTIONS["release"])
-    for i in map(int, np.flatnonzero(~(carries & np.isin(t.event_occasion, occasions)))):
+    for i in map(int, np.flatnonzero(tree.tables.event_action != ACTIONS["release"])):
         raise MechanismError(
-            f"event {tree._names.events[i]}: expected the release of a joint that carries a body, on "
-            "command, at a time, on a force or a torque, which is all that method cfe knows; got another. "
-            "Use reduced."
+            f"event {tree._names.events[i]}: expected a release, which is all that method cfe knows; got a lock "
+            "or a stop. Use reduced."
         )
 
 
@@ -132,9 +129,12 @@ def _free(tables: Tables) -> Tables:
         gravity=tables.gravity,
         stiffness=np.zeros(6 * n),
         damping=np.zeros(6 * n),
-        event_joint=tables.event_joint,
+        # What an event waits for is asked of the tree; of the bodies' own joints, nothing changes.
+        event_joint=np.zeros_like(tables.event_joint),
         event_action=tables.event_action,
-        event_occasion=tables.event_occasion,
+        event_occasion=np.where(
+            np.isin(tables.event_occasion, _PLACES), OCCASIONS["time"], tables.event_occasion
+        ),
         event_side=tables.event_side,
         event_threshold=tables.event_threshold,
         event_restitution=tables.event_restitution,
