@@ -97,6 +97,7 @@ static lw_spatial load_of(lw_maximal *m, const lw_link *joint, const lw_link *ch
 void lw_joint_loads(lw_maximal *m, const lw_multibody *mb, const double *q) {
     for (int32_t i = 0; i < m->n; ++i) {
         const lw_link *joint = &m->tree->link[i], *child = &mb->link[i];
+        m->load[i].linear = m->load[i].angular = zero;
         if (!joint->sprung && !joint->damped) continue;
         coordinates(m, mb, i, q);
         lw_base b = base_of(mb, joint);

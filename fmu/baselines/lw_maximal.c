@@ -207,7 +207,6 @@ void lw_maximal_attach(void *memory, lw_multibody *bodies, lw_multibody *tree, i
     lw_envelope_build(m);
     for (int32_t i = 0, angle = 7 * m->n; i < m->n; ++i) {
         lw_sym3 singular = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-        m->load[i] = none;
         if (!lw_inverse_sym3(bodies->link[i].inertia, &m->inverse_inertia[i])) m->inverse_inertia[i] = singular;
         m->turn[i] = turns(&tree->link[i]) ? angle++ : -1;
         bodies->link[i].articulated = no_inertia;
@@ -260,6 +259,7 @@ void lw_maximal_coordinates(lw_multibody *bodies, const double *state, double *q
     lw_modes(bodies, state + bodies->nq + bodies->nv + 1);
     lw_maximal_follow(m, bodies);
     lw_kinematics(bodies, state, state + bodies->nq);
+    memset(m->q, 0, (size_t)(m->tree->nq + m->tree->nv) * sizeof(double)); /* v follows: none is left from others */
     lw_joint_coordinates(m, bodies, state);
     memcpy(q, m->q, (size_t)m->tree->nq * sizeof(double));
     memcpy(v, m->v, (size_t)m->tree->nv * sizeof(double));

@@ -68,5 +68,5 @@ def test_windows_that_fold_to_a_line_and_open_again():
 
 
 def test_the_paper_has_no_loops():
-    with pytest.raises(MechanismError, match=r'joint "last": expected no loop'):
+    with pytest.raises(MechanismError, match=r'loop "last": expected none'):
         Incremental(four_bars(1)[0].tables, closures=["last"])

@@ -54,6 +54,19 @@ def test_a_loop_in_the_log(tmp_path: Path):
     assert np.abs(paths[0].closure_reaction).max() > 1.0
 
 
+def test_stages_that_part(tmp_path: Path):
+    """The release of the built-in scenario: at the same time, and the same flight after it."""
+    paths = []
+    for method in ("reduced", "cfe"):
+        settings = ["time.end=0.2", "bus.transport=inprocess", f"dynamics.method={method}"]
+        outcome = run(load("stage_separation", settings), tmp_path / method, lambda step: None)
+        paths.append(open_log(outcome.log).trajectory())
+    for name in ("position", "linear", "angular", "q", "v", "reaction", "event_time", "dissipated_work"):
+        one, other = (getattr(path, name) for path in paths)
+        np.testing.assert_allclose(one, other, atol=1e-7, err_msg=name)
+    assert 0.0 < paths[0].event_time[-1, 0] < 0.2
+
+
 def test_verify_makes_it_again_bit_for_bit(tmp_path: Path):
     assert verify(*scenario_of(fly(tmp_path, "cfe"))).identical
 

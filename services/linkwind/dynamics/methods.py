@@ -22,19 +22,14 @@ def multibody(mechanism: Mechanism, scenario: Scenario) -> Multibody:
         MechanismError: the method cannot do this mechanism.
     """
     dynamics = scenario.dynamics
-    parts = (mechanism.tables, mechanism.bodies, mechanism.closures, mechanism.events)
-    if mechanism.forces and dynamics.method == "incremental":
-        raise MechanismError(
-            f"{scenario.source}: dynamics.method: expected reduced or cfe, because {mechanism.forces[0]} is "
-            "a force element, which the paper does not have; got incremental. Use reduced."
-        )
+    names = mechanism.bodies, mechanism.closures, mechanism.events, mechanism.forces
     try:
         if dynamics.method == "cfe":
             stabilisation = Stabilisation[dynamics.stabilisation.upper()]
             time = dynamics.stabilisation_time
-            return Cfe(*parts, forces=mechanism.forces, stabilisation=stabilisation, time=time)
+            return Cfe(mechanism.tables, *names, stabilisation=stabilisation, time=time)
         if dynamics.method == "incremental":
-            return Incremental(*parts[:3])
+            return Incremental(mechanism.tables, *names)
     except MechanismError as error:
         raise MechanismError(f"{scenario.source}: dynamics.method: {error}") from error
-    return Multibody(*parts, forces=mechanism.forces)
+    return Multibody(mechanism.tables, *names)

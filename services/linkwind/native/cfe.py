@@ -104,8 +104,8 @@ class Cfe(Multibody):
 def _check_events(tree: Multibody) -> None:
     for i in map(int, np.flatnonzero(tree.tables.event_action != ACTIONS["release"])):
         raise MechanismError(
-            f"event {tree._names.events[i]}: expected a release, which is all that method cfe knows; got a lock "
-            "or a stop. Use reduced."
+            f"event {tree._names.events[i]}: expected a release, which is all that method cfe knows; got "
+            "a lock or a stop. Use reduced."
         )
 
 

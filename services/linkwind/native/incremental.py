@@ -26,35 +26,41 @@ class Incremental(Multibody):
     integrators ``EULER`` and ``SEMI_IMPLICIT_EULER`` make of these accelerations.
     """
 
-    def __init__(self, tables: Tables, bodies: Sequence[str] = (), closures: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        tables: Tables,
+        bodies: Sequence[str] = (),
+        closures: Sequence[str] = (),
+        events: Sequence[str] = (),
+        forces: Sequence[str] = (),
+    ) -> None:
         """Build the mechanism.
 
         Args:
             tables: the mechanism, as for ``Multibody``.
             bodies: names of the bodies, for errors; their numbers if not given.
             closures: likewise of the joints that close loops.
+            events: likewise of what may happen.
+            forces: likewise of the force elements.
 
         Raises:
             MechanismError: a table has a wrong shape or a wrong value, or a joint that the paper does not
                 have.
         """
-        super().__init__(tables, bodies, closures)
-        if self.closures:
-            raise MechanismError(
-                f"joint {self._names[1][0]}: expected no loop, which the method incremental does not have; "
-                "got one that this joint closes. Use reduced or cfe."
-            )
-        if self.events:
-            raise MechanismError(
-                "events: expected none, for the method incremental releases and locks nothing; got "
-                f"{self.events}. Use reduced or cfe."
-            )
+        super().__init__(tables, bodies, closures, events, forces)
+        names = self._names
+        for kind, others in (("loop", names.closures), ("event", names.events), ("force", names.forces)):
+            if others:
+                raise MechanismError(
+                    f"{kind} {others[0]}: expected none, for which the method incremental has no equation; "
+                    "got one. Use reduced or cfe."
+                )
         self._equations = np.zeros((_size(self._model) + 7) // 8)
         body = _attach(address(self._equations), self._model)
         if body >= 0:
             kind = next(name for name, code in JOINT_TYPES.items() if code == tables.joint_type[body])
             raise MechanismError(
-                f"joint of body {self._names[0][body]}: expected a hinge about z on another body, or a body "
+                f"joint of body {names.bodies[body]}: expected a hinge about z on another body, or a body "
                 "free in the plane (planar, to the world, at its centre of mass), no spring, no damper: all "
                 f"that the method incremental knows; got one of type {kind}. Use reduced or cfe."
             )
