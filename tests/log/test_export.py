@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import csv
+import sys
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from linkwind.cli import app
-from linkwind.errors import LogError
+from linkwind.errors import InputError, LogError
 from linkwind.log import export
 from linkwind.log.reader import open_log
+from linkwind.log.vtk import export_vtk
 from tests.log.sample import NAMES, new_writer, record
 
 POINTS = 20
@@ -47,6 +49,36 @@ def test_every_number_comes_back(tmp_path, monkeypatch):
         assert steps["extrapolation_error.0"][k] == 0.5 * k
         assert np.isnan(steps["extrapolation_error.3"][k])
     assert "ball.force.x [N]" not in wrench  # the provider does not act on it
+
+
+def test_parquet_has_the_bits_of_csv(tmp_path, monkeypatch):
+    """Read by pyarrow and held against the numbers that the text gives."""
+    from pyarrow import parquet
+
+    monkeypatch.setattr(export, "BLOCK", 7)
+    record(tmp_path / "log.mcap", POINTS)
+    log = open_log(tmp_path / "log.mcap")
+    texts, binaries = (kind(log, tmp_path / "out") for kind in (export.export_csv, export.export_parquet))
+    assert [file.name for file in binaries] == ["trajectory.parquet", "steps.parquet", "wrench_aero.parquet"]
+    for text, binary in zip(texts, binaries, strict=True):
+        table = parquet.read_table(binary)
+        assert table.column_names == list(read(text))
+        for name, values in read(text).items():
+            column = table[name].to_numpy()
+            assert np.array_equal(column.astype(float).view(np.uint64), values.view(np.uint64)), name
+    with pytest.raises(LogError, match=r"trajectory\.parquet: expected to make a new file"):
+        export.export_parquet(log, tmp_path / "out")
+
+
+def test_a_missing_library_is_named(tmp_path, monkeypatch):
+    record(tmp_path / "log.mcap", 2)
+    log = open_log(tmp_path / "log.mcap")
+    for module in ("pyarrow", "pyevtk"):
+        monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(InputError, match=r"pip install 'linkwind\[parquet\]'"):
+        export.export_parquet(log, tmp_path / "a")
+    with pytest.raises(InputError, match=r"pip install 'linkwind\[vtk\]'"):
+        export_vtk(log, tmp_path / "b")
 
 
 def test_nothing_is_written_over_and_nothing_from_nothing(tmp_path):

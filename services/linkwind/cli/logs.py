@@ -16,6 +16,8 @@ class Format(StrEnum):
     """Kind of files to export."""
 
     CSV = "csv"
+    PARQUET = "parquet"
+    VTK = "vtk"
 
 
 def register(app: typer.Typer) -> None:
@@ -84,16 +86,19 @@ def export(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the files.")],
     format_: Annotated[Format, typer.Option("--format", help="Kind of files.")] = Format.CSV,
 ) -> None:
-    """Write trajectory, steps and wrenches of a log as tables.
+    """Write trajectory, steps and wrenches of a log as tables; with vtk, its flow and bodies for ParaView.
 
     Example: linkwind log export runs/two_link-20260101-120000/log.mcap -o tables --format csv
     """
-    from linkwind.log.export import export_csv
+    from linkwind.log.export import export_csv, export_parquet
     from linkwind.log.reader import open_log
+    from linkwind.log.vtk import export_vtk
+
+    kinds = {Format.CSV: export_csv, Format.PARQUET: export_parquet, Format.VTK: export_vtk}
 
     opened = open_log(log)
     if not opened.complete:
         reason = opened.damage.text if opened.damage else opened.error
         typer.echo(f"note: the log is not complete: {reason or 'the run was cut off'}", err=True)
-    for path in export_csv(opened, out):
+    for path in kinds[format_](opened, out):
         typer.echo(f"wrote {path}")

@@ -1,17 +1,16 @@
-"""A log as CSV files, for tools that read no MCAP: every number as the shortest text that gives its bits."""
+"""A log as tables for tools that read no MCAP: CSV, the shortest text that gives the bits; Parquet."""
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-import numpy as np
 from numpy.typing import NDArray
 
-from linkwind.errors import LogError
+from linkwind.errors import InputError, LogError
 from linkwind.log import contents, tables
 from linkwind.log.difference import WIDTHS
 from linkwind.log.reader import Log
@@ -35,12 +34,62 @@ UNITS: dict[str, Sequence[str]] = {
 }  # fmt: skip
 
 
+class Block(NamedTuple):
+    """Messages of a topic that follow each other: titles of columns, and the columns, shape (messages,)."""
+
+    head: list[str]
+    columns: list[NDArray[Any]]
+
+
 def export_csv(log: Log, folder: Path) -> list[Path]:
-    """Write ``trajectory.csv``, ``steps.csv`` and ``wrench_PROVIDER.csv`` of what can be read.
+    """Write ``trajectory.csv``, ``steps.csv`` and ``wrench_PROVIDER.csv``; see :func:`_export`."""
+
+    def write(path: Path, blocks: Iterator[Block]) -> None:
+        with path.open("x", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            for number, (head, columns) in enumerate(blocks):
+                if not number:
+                    writer.writerow(head)
+                writer.writerows(zip(*(column.tolist() for column in columns), strict=True))
+
+    return _export(log, folder, "csv", write)
+
+
+def export_parquet(log: Log, folder: Path) -> list[Path]:
+    """Write ``trajectory.parquet``, ``steps.parquet`` and ``wrench_PROVIDER.parquet``; see :func:`_export`.
+
+    Raises:
+        InputError: pyarrow is not there.
+    """
+    try:
+        import pyarrow as pa
+        from pyarrow.parquet import ParquetWriter
+    except ImportError as error:
+        raise InputError(
+            "--format parquet: expected the package pyarrow; got none. Install it with: "
+            "pip install 'linkwind[parquet]'"
+        ) from error
+
+    def write(path: Path, blocks: Iterator[Block]) -> None:
+        tables_ = (pa.table(dict(zip(*block, strict=True))) for block in blocks)
+        first = next(tables_)
+        with path.open("xb") as file, ParquetWriter(file, first.schema) as writer:
+            for table in (first, *tables_):
+                writer.write_table(table)
+
+    return _export(log, folder, "parquet", write)
+
+
+def _export(
+    log: Log, folder: Path, suffix: str, write: Callable[[Path, Iterator[Block]], None]
+) -> list[Path]:
+    """Write trajectory, steps and wrenches of what can be read.
 
     Args:
         log: to read.
         folder: for the files; is made if it is not there.
+        suffix: of the files.
+        write: writes one of them.
 
     Returns:
         the files, one for each topic that has a message.
@@ -55,9 +104,8 @@ def export_csv(log: Log, folder: Path) -> list[Path]:
         folder.mkdir(parents=True, exist_ok=True)
         for topic, name in names.items():
             if log.topics.get(topic):
-                path = folder / f"{name}.csv"
-                with path.open("x", newline="", encoding="utf-8") as file:
-                    _write(log, topic, csv.writer(file))
+                path = folder / f"{name}.{suffix}"
+                write(path, _blocks(log, topic))
                 written.append(path)
     except OSError as error:
         raise LogError(
@@ -68,28 +116,20 @@ def export_csv(log: Log, folder: Path) -> list[Path]:
     return written
 
 
-def _write(log: Log, topic: str, writer: Any) -> None:
+def _blocks(log: Log, topic: str) -> Iterator[Block]:
+    """Yield the messages of a topic, so many at a time."""
     name = str(contents.message_name(topic))
     provider = topic.removeprefix(contents.WRENCH)
     bodies, numbers = log.provider_bodies.get(provider, log.bodies), log.diagnostics.get(provider, ())
     payloads = (message.payload for message in log.raw(topic))
-    head: list[str] = []
     while block := list(islice(payloads, BLOCK)):
         columns = tables.columns(block, name, f"{log.path}: {topic}")
         t = tables.seconds(columns.pop("time_ns"))
-        if not head:
-            labels = (_labels(field, values, bodies, numbers) for field, values in columns.items())
-            head = [label for field in labels for label in field]
-            head.insert(1, "t [s]")
-            writer.writerow(head)
+        labels = (_labels(field, values, bodies, numbers) for field, values in columns.items())
+        head = [label for field in labels for label in field]
         step, *others = columns.values()
-        writer.writerows(_rows([step, t, *others]))
-
-
-def _rows(columns: Sequence[NDArray[Any]]) -> Iterator[list[float | int]]:
-    """Yield the values of each message in one list."""
-    for parts in zip(*(np.asarray(column).tolist() for column in columns), strict=True):
-        yield [value for part in parts for value in part]
+        values = [column for field in (step, t, *others) for column in field.T]
+        yield Block([head[0], "t [s]", *head[1:]], values)
 
 
 def _labels(field: str, values: NDArray[Any], bodies: Sequence[str], numbers: Sequence[str]) -> Iterator[str]:

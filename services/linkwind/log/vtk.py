@@ -1,0 +1,177 @@
+"""Flow and bodies of a log for ParaView and its relatives: files of VTK's XML formats, with their times.
+
+Frames of a fluid become images (``flow_PROVIDER_0001.vti``, values in cells), bodies their outlines in the
+plane of the flow, with the forces on them (``bodies_0001.vtu``); ``*.pvd`` hold them together over time.
+Bodies are written at the times of the frames, or, without any, at times spread evenly over the run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from linkwind.errors import InputError, LogError
+from linkwind.frames import FlowFrame
+from linkwind.log import contents, tables
+from linkwind.log.reader import Log
+from linkwind.scenario import from_json
+from linkwind.spatial import Array
+
+STATES = 300  # of the bodies, where there are no frames
+VERTEX, POLYLINE, POLYGON = 1, 4, 7  # types of VTK's cells
+BLOCK = 1024  # states in memory at a time
+
+
+class Outlines(NamedTuple):
+    """Outlines of bodies in their frames, a cell each: points [m], whose they are; ends, types of cells."""
+
+    points: Array
+    body: Any
+    ends: Any
+    types: Any
+
+
+def export_vtk(log: Log, folder: Path) -> list[Path]:
+    """Write the frames of every fluid, and the bodies.
+
+    Args:
+        log: to read.
+        folder: for the files; is made if it is not there.
+
+    Returns:
+        the collections, one for each fluid and one for the bodies.
+
+    Raises:
+        InputError: pyevtk is not there.
+        LogError: the folder has files, or cannot be written; or the log has neither frames nor states.
+    """
+    hl, group = _library()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()):
+            raise LogError(
+                f"{folder}: expected a new or empty folder; got one with files. Choose another -o."
+            )
+        times: list[int] = []
+        written = []
+        for provider in log.flows:
+            name = f"flow_{provider}"
+            found = group(str(folder / name))
+            for number, frame in enumerate(log.frames(provider), 1):
+                found.addFile(_image(hl, folder / f"{name}_{number:04}", frame), frame.time_ns / 1e9)
+                times.append(frame.time_ns)
+            written.append(_saved(found, folder / name))
+        if log.topics.get(contents.STATE):
+            found = group(str(folder / "bodies"))
+            for number, (time_ns, state) in enumerate(_states(log, times), 1):
+                found.addFile(_bodies(hl, folder / f"bodies_{number:04}", log, state), time_ns / 1e9)
+            written.append(_saved(found, folder / "bodies"))
+    except OSError as error:
+        raise LogError(
+            f"{folder}: expected to write there; got {error.strerror}. Choose another -o."
+        ) from error
+    if not written:
+        raise LogError(f"{log.path}: expected frames or states; got none. The run ended before the first.")
+    return written
+
+
+def _library() -> tuple[Any, Any]:
+    try:
+        from pyevtk import hl
+        from pyevtk.vtk import VtkGroup
+    except ImportError as error:
+        raise InputError(
+            "--format vtk: expected the package pyevtk; got none. Install it with: "
+            "pip install 'linkwind[vtk]'"
+        ) from error
+    return hl, VtkGroup
+
+
+def _saved(found: Any, path: Path) -> Path:
+    found.save()
+    return path.with_name(f"{path.name}.pvd")
+
+
+def _image(hl: Any, path: Path, frame: FlowFrame) -> str:
+    left, _, bottom, _ = frame.extent
+
+    def cells(values: Any) -> Any:  # x runs first
+        return np.asfortranarray(values.T[:, :, None])
+
+    u, v = frame.velocity[:, :, 0], frame.velocity[:, :, 1]
+    data = {
+        "velocity [m/s]": (cells(u), cells(v), cells(np.zeros_like(u))),
+        "pressure [Pa]": cells(frame.pressure),
+        "vorticity [1/s]": cells(frame.vorticity),
+    }
+    spacing = (frame.cell, frame.cell, frame.cell)
+    return str(hl.imageToVTK(str(path), origin=(left, bottom, 0.0), spacing=spacing, cellData=data))
+
+
+def _states(log: Log, times: Sequence[int]) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield simulation time [ns] and fields of the states at ``times``, or of some that are spread evenly."""
+    stride = max(1, log.topics[contents.STATE] // STATES)
+    wanted = set(times)
+    messages = log.raw(contents.STATE)
+    count = 0
+    while block := list(islice(messages, BLOCK)):
+        chosen = []
+        for message in block:
+            if message.time_ns in wanted if wanted else count % stride == 0:
+                chosen.append(message)
+            count += 1
+        if chosen:
+            columns = tables.columns([m.payload for m in chosen], "State", f"{log.path}: {contents.STATE}")
+            for row, message in enumerate(chosen):
+                yield message.time_ns, {name: values[row] for name, values in columns.items()}
+
+
+def _bodies(hl: Any, path: Path, log: Log, state: dict[str, Any]) -> str:
+    outlines = _outlines(log)
+    turn = _rotations(state["motion.orientation"].reshape(-1, 4))[outlines.body]
+    position = state["motion.position"].reshape(-1, 3)
+    points = np.einsum("pij,pj->pi", turn, outlines.points) + position[outlines.body]
+    wrench = state["wrench"].reshape(-1, 6)
+
+    def vector(values: Array) -> tuple[Array, ...]:
+        return tuple(np.ascontiguousarray(column) for column in values.T)
+
+    data = {
+        "body": np.arange(len(position)),
+        "force [N]": vector(wrench[:, :3]),
+        "torque [N m]": vector(wrench[:, 3:]),
+        "velocity [m/s]": vector(state["motion.linear"].reshape(-1, 3)),
+        "angular velocity [rad/s]": vector(state["motion.angular"].reshape(-1, 3)),
+    }
+    x, y, z = vector(points)
+    where = np.arange(len(points))
+    return str(
+        hl.unstructuredGridToVTK(str(path), x, y, z, where, outlines.ends, outlines.types, cellData=data)
+    )
+
+
+def _outlines(log: Log) -> Outlines:
+    """Return the outlines of a log's bodies; a body without a shape is a point."""
+    points, body, types = [], [], []
+    for index, each in enumerate(from_json(log.scenario_json).bodies):
+        flat = np.zeros((1, 2)) if each.shape is None else each.shape.outline()
+        points.append(np.hstack([flat, np.zeros((len(flat), 1))]))
+        body += [index] * len(flat)
+        types.append(VERTEX if each.shape is None else POLYGON if each.shape.closed else POLYLINE)
+    ends = np.cumsum([len(each) for each in points])
+    return Outlines(np.vstack(points), np.array(body), ends, np.array(types, np.uint8))
+
+
+def _rotations(q: Array) -> Array:
+    """Return the rotation matrices of unit quaternions (w, x, y, z), shape (n, 3, 3)."""
+    w, x, y, z = q.T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
