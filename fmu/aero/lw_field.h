@@ -1,4 +1,5 @@
-/* Force fields given as expressions, compiled to postfix programs for a stack machine.
+/* Force fields given as expressions, compiled to the programs of lw_expression.h, whose results
+ * are fx, fy, fz, tx, ty, tz.
  *
  * An expression may use the variables below (world coordinates, SI units); theta is the heading of the
  * body's x axis about world z, unwrapped in time against the last committed value. */
@@ -10,26 +11,9 @@
 #include "lw_forces.h"
 #include "lw_math.h"
 
-/* Machine limits; whoever writes a program has to keep to them. */
-enum { LW_FIELD_STACK = 64, LW_FIELD_LOCALS = 64 };
-
 enum { /* variables, by operand of LW_VARIABLE */
     LW_VAR_T, LW_VAR_X, LW_VAR_Y, LW_VAR_Z, LW_VAR_VX, LW_VAR_VY, LW_VAR_VZ,
     LW_VAR_WX, LW_VAR_WY, LW_VAR_WZ, LW_VAR_THETA, LW_VARIABLES
-};
-
-enum { /* operations; the operand, where there is one, in brackets */
-    LW_CONSTANT, /* push constants[operand] */
-    LW_VARIABLE, /* push the variable [operand] */
-    LW_LOCAL,    /* push the local value [operand] */
-    LW_DEFINE,   /* pop into the local value [operand] */
-    LW_RESULT,   /* pop into component [operand] of (fx, fy, fz, tx, ty, tz) */
-    LW_NEGATE, LW_ADD, LW_SUBTRACT, LW_MULTIPLY, LW_DIVIDE,
-    LW_POWER,         /* real exponent */
-    LW_POWER_INTEGER, /* exponent [operand], by repeated multiplication */
-    LW_SIN, LW_COS, LW_TAN, LW_ASIN, LW_ACOS, LW_ATAN, LW_SINH, LW_COSH, LW_TANH,
-    LW_EXP, LW_LOG, LW_SQRT, LW_ABS,
-    LW_ATAN2, LW_HYPOT, LW_MIN, LW_MAX
 };
 
 typedef struct {

@@ -8,10 +8,11 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from linkwind.aero.expression import CONSTANTS, FUNCTIONS, compile_program
-from linkwind.aero.syntax import MAX_LENGTH
 from linkwind.errors import ExpressionError
-from linkwind.native.forces import LOCALS_SIZE, STACK_SIZE, Field, FieldTable, Operation
+from linkwind.expression import CONSTANTS, FUNCTIONS, compile_program
+from linkwind.expression.syntax import MAX_LENGTH
+from linkwind.native.expressions import LOCALS_SIZE, STACK_SIZE, Operation
+from linkwind.native.forces import COMPONENTS, VARIABLES, Field, FieldTable
 from linkwind.spatial import Motion, Wrench
 
 MOTION = Motion(
@@ -29,13 +30,14 @@ VALUES = dict(
     ),
     theta=math.atan2(2 * math.cos(0.35) * math.sin(0.35), math.cos(0.35) ** 2 - math.sin(0.35) ** 2),
 )
+FIELD = {"variables": VARIABLES, "components": COMPONENTS}
 PYTHON = {name: getattr(math, name, None) for name in FUNCTIONS}
 PYTHON |= {"abs": abs, "min": min, "max": max}
 
 
 def run(let, text):
     """The value of an expression, computed by the library."""
-    program = compile_program(let, {"tz": text}, "scene.toml: aero.field.body")
+    program = compile_program(let, {"tz": text}, "scene.toml: aero.field.body", **FIELD)
     table = FieldTable(
         np.zeros(1, dtype=np.int32),
         np.array([0, len(program.code)], dtype=np.int32),
@@ -144,7 +146,7 @@ def test_long_sums_and_deep_brackets():
 
 def error(text, let=None):
     with pytest.raises(ExpressionError) as caught:
-        compile_program(let or {}, {"fx": text}, "scene.toml: aero.field.body")
+        compile_program(let or {}, {"fx": text}, "scene.toml: aero.field.body", **FIELD)
     message = str(caught.value)
     assert "\n" not in message
     assert "expected" in message
@@ -247,7 +249,7 @@ def test_no_program_leaves_the_stack(text):
     pops |= {op: 2 for op in Operation if op in range(Operation.ADD, Operation.POWER_INTEGER)}
     pops |= {op: 2 for op in Operation if op >= Operation.ATAN2}
     try:
-        program = compile_program({}, {"fx": text}, "item")
+        program = compile_program({}, {"fx": text}, "item", **FIELD)
     except ExpressionError:
         assert text.count("(") >= STACK_SIZE
         return

@@ -206,7 +206,8 @@ def sources(part: str, version: int) -> list[Path]:
     """Return the C files of an FMU besides its data."""
     left_out = {f"lw_part_{'aero' if part == 'dynamics' else 'dynamics'}.c", f"lw_fmi{5 - version}.c"}
     folders = [C / ("core" if part == "dynamics" else "aero"), C / "fmi"]
-    return sorted(f for folder in folders for f in folder.glob("*.c") if f.name not in left_out)
+    shared = [C / "core" / "lw_expression.c"] if part == "aero" else []
+    return sorted(shared + [f for folder in folders for f in folder.glob("*.c") if f.name not in left_out])
 
 
 def flags() -> list[str]:

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from linkwind.native import forces
+from linkwind.native.expressions import LOCALS_SIZE, STACK_SIZE, Operation
 from linkwind.native.forces import (
     Coefficients,
     Field,
     FieldTable,
-    Operation,
     Plates,
     PlateTable,
     WindTable,
@@ -23,14 +23,14 @@ RNG = np.random.default_rng(20)
 CALM = WindTable(np.zeros(3), np.zeros((0, 8)))
 
 
-def header(name):
-    text = (files("linkwind") / "_data" / "fmu" / "aero" / name).read_text()
+def header(name, folder):
+    text = (files("linkwind") / "_data" / "fmu" / folder / name).read_text()
     return re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
 
 
-def enumerations(name):
+def enumerations(name, folder="aero"):
     """Each enum of a header as {identifier: value}."""
-    for body in re.findall(r"enum \{(.*?)\}", header(name), flags=re.DOTALL):
+    for body in re.findall(r"enum \{(.*?)\}", header(name, folder), flags=re.DOTALL):
         value, out = -1, {}
         for entry in filter(None, map(str.strip, body.split(","))):
             identifier, _, given = (part.strip() for part in entry.partition("="))
@@ -40,10 +40,10 @@ def enumerations(name):
 
 
 def test_operations_variables_and_limits_are_those_of_the_c_header():
-    limits, variables, operations = enumerations("lw_field.h")
+    (variables,), (limits, operations) = enumerations("lw_field.h"), enumerations("lw_expression.h", "core")
     assert operations == {f"LW_{op.name}": op.value for op in Operation}
     assert list(variables) == [f"LW_VAR_{name.upper()}" for name in forces.VARIABLES] + ["LW_VARIABLES"]
-    assert limits == {"LW_FIELD_STACK": forces.STACK_SIZE, "LW_FIELD_LOCALS": forces.LOCALS_SIZE}
+    assert limits == {"LW_EXPRESSION_STACK": STACK_SIZE, "LW_EXPRESSION_LOCALS": LOCALS_SIZE}
 
 
 def test_coefficient_sets_are_those_of_the_c_header():

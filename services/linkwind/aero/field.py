@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from linkwind.aero.base import Capabilities, body_indices, item
-from linkwind.aero.expression import Program, compile_program
 from linkwind.errors import ProtocolError, SimulationError
-from linkwind.native.forces import COMPONENTS, Field, FieldTable
+from linkwind.expression import Program, compile_program
+from linkwind.native.forces import COMPONENTS, VARIABLES, Field, FieldTable
 from linkwind.scenario import FieldExpressions, Provider, Scenario
 from linkwind.scenario.topology import carries
 from linkwind.spatial import Array, Motion, Wrench
@@ -31,7 +31,7 @@ def field_table(scenario: Scenario, provider: Provider) -> FieldTable:
 
 def _program(expressions: FieldExpressions, where: str) -> Program:
     results = {component: getattr(expressions, component) for component in COMPONENTS}
-    return compile_program(expressions.let, results, where)
+    return compile_program(expressions.let, results, where, variables=VARIABLES, components=COMPONENTS)
 
 
 def _join(programs: list[Program], bodies: list[int]) -> FieldTable:

@@ -13,7 +13,8 @@ from linkwind.fmi.dynamics import ADDED_INERTIA_ELEMENTS, TIME, VECTOR, output, 
 from linkwind.fmi.structure import Dependences
 from linkwind.fmi.variables import Dependence, Variable
 from linkwind.mechanism import Mechanism
-from linkwind.native.forces import VARIABLES, FieldTable, Operation
+from linkwind.native.expressions import Operation
+from linkwind.native.forces import VARIABLES, FieldTable
 from linkwind.native.multibody import Multibody
 from linkwind.scenario import Provider, Scenario
 from linkwind.spatial import Motion

@@ -31,7 +31,8 @@ def c_sources(part: Part, version: FmiVersion) -> dict[str, bytes]:
         "lw_linear.c",
     }
     root = files("linkwind").joinpath("_data", "fmu")
-    found = {} if mechanism else {"lw_math.h": root.joinpath("core", "lw_math.h").read_bytes()}
+    shared = () if mechanism else ("lw_math.h", "lw_expression.h", "lw_expression.c")
+    found = {name: root.joinpath("core", name).read_bytes() for name in shared}
     for folder in ("core" if mechanism else "aero", "fmi"):
         for file in root.joinpath(folder).iterdir():
             if file.name.endswith((".c", ".h")) and file.name not in left_out:

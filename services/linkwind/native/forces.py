@@ -19,21 +19,8 @@ from linkwind.spatial import Array, Motion, Wrench, address
 
 Indices = NDArray[np.int32]
 
-STACK_SIZE = 64
-LOCALS_SIZE = 64
-MAX_INTEGER_POWER = 16  # above it repeated multiplication loses more digits than pow
-
 VARIABLES = ("t", "x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz", "theta")
 COMPONENTS = ("fx", "fy", "fz", "tx", "ty", "tz")
-
-
-# Instructions of the stack machine (fmu/aero/lw_field.h), numbered in its order.
-Operation = enum.IntEnum(
-    "Operation",
-    "CONSTANT VARIABLE LOCAL DEFINE RESULT NEGATE ADD SUBTRACT MULTIPLY DIVIDE POWER POWER_INTEGER "
-    "SIN COS TAN ASIN ACOS ATAN SINH COSH TANH EXP LOG SQRT ABS ATAN2 HYPOT MIN MAX",
-    start=0,
-)
 
 
 class Coefficients(enum.IntEnum):
@@ -83,7 +70,7 @@ class FieldTable:
         body: index of each program's body among all bodies, shape (n,).
         start: first instruction of each program, and the end of the last, shape (n + 1,).
         code: operation and operand of each instruction, shape (instructions, 2).
-        constants: what ``Operation.CONSTANT`` pushes, shape (any,).
+        constants: what its instructions push, shape (any,).
     """
 
     body: Indices

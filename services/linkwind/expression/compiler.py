@@ -1,4 +1,4 @@
-"""Expressions of a force field → a postfix program for the stack machine of ``fmu/aero/lw_field.h``.
+"""Expressions → a postfix program for the stack machine of ``fmu/core/lw_expression.h``.
 
 Whatever is not on the lists below is refused, with its column.
 """
@@ -8,19 +8,13 @@ from __future__ import annotations
 import ast
 import difflib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from linkwind.aero.syntax import MAX_NESTING, Source
 from linkwind.errors import ExpressionError
-from linkwind.native.forces import (
-    COMPONENTS,
-    LOCALS_SIZE,
-    MAX_INTEGER_POWER,
-    STACK_SIZE,
-    VARIABLES,
-    Operation,
-)
+from linkwind.expression.curves import Curve
+from linkwind.expression.syntax import MAX_NESTING, Source
+from linkwind.native.expressions import LOCALS_SIZE, MAX_INTEGER_POWER, STACK_SIZE, Operation
 
 CONSTANTS = {"pi": math.pi}
 _UNARY = "sin cos tan asin acos atan sinh cosh tanh exp log sqrt abs"
@@ -40,7 +34,7 @@ _BINARY: dict[type[ast.operator], Operation] = {
     ast.Pow: Operation.POWER,
 }
 
-RESERVED = frozenset((*VARIABLES, *CONSTANTS, *FUNCTIONS))
+_SHIFTED = (Operation.CONSTANT, Operation.TABLE)
 
 
 @dataclass(frozen=True)
@@ -52,46 +46,59 @@ class Program:
 
     def shifted(self, places: int) -> list[tuple[int, int]]:
         """Return the code for constants that stand ``places`` further on."""
-        return [(op, operand + places * (op is Operation.CONSTANT)) for op, operand in self.code]
+        return [(op, operand + places * (op in _SHIFTED)) for op, operand in self.code]
 
 
-def compile_program(let: Mapping[str, str], results: Mapping[str, str], item: str) -> Program:
-    """Return the program that gives the wrench on one body.
+def compile_program(
+    let: Mapping[str, str],
+    results: Mapping[str, str | Curve],
+    item: str,
+    *,
+    variables: Sequence[str],
+    components: Sequence[str],
+) -> Program:
+    """Return the program that gives some results.
 
     Args:
         let: named expressions in order; each may use those before it.
-        results: expressions of the components fx … tz; a missing one is zero.
+        results: expressions of some of the components, or curves over the first variable.
         item: where they stand, for errors: ``two_link.toml: aero.field.link1``.
+        variables: names that expressions may use, in the order that the program is given them.
+        components: names of all results, in the order that the program numbers them.
 
     Raises:
         ExpressionError: a name or an expression is wrong.
     """
-    compiler = _Compiler()
+    compiler = _Compiler(variables)
     for name, text in let.items():
         here = f"{item}.let.{name}"
-        _check_name(name, here)
+        _check_name(name, here, variables)
         compiler.compile(text, here)
         compiler.define(name, here)
-    for component, text in results.items():
-        compiler.compile(text, f"{item}.{component}")
-        compiler.emit(Operation.RESULT, COMPONENTS.index(component))
+    for component, law in results.items():
+        if isinstance(law, Curve):
+            compiler.table(law)
+        else:
+            compiler.compile(law, f"{item}.{component}")
+        compiler.emit(Operation.RESULT, components.index(component))
     return Program(tuple(compiler.code), tuple(compiler.constants))
 
 
-def _check_name(name: str, item: str) -> None:
+def _check_name(name: str, item: str, variables: Sequence[str]) -> None:
     if not (name.isidentifier() and name.isascii()):
         raise ExpressionError(f'{item}: expected a name of letters, digits and _; got "{name}". Rename it.')
-    if name in RESERVED:
+    if name in (*variables, *CONSTANTS, *FUNCTIONS):
         raise ExpressionError(
             f'{item}: expected a name that is not taken; got "{name}", which is a variable, constant or '
-            "function of every field. Rename it."
+            "function already. Rename it."
         )
 
 
 class _Compiler:
     """Emits postfix code for syntax trees, and watches the machine's limits."""
 
-    def __init__(self) -> None:
+    def __init__(self, variables: Sequence[str]) -> None:
+        self._variables = variables
         self.code: list[tuple[Operation, int]] = []
         self.constants: list[float] = []
         self.locals: dict[str, int] = {}
@@ -107,6 +114,12 @@ class _Compiler:
             )
         self.locals[name] = len(self.locals)
         self.emit(Operation.DEFINE, self.locals[name])
+
+    def table(self, curve: Curve) -> None:
+        """Emit the code that leaves the value of a curve over the first variable on the stack."""
+        self.emit(Operation.VARIABLE, 0)
+        self.emit(Operation.TABLE, len(self.constants))
+        self.constants += curve.layout()
 
     def compile(self, text: str, item: str) -> None:
         """Emit the code that leaves the value of ``text`` on the stack."""
@@ -161,14 +174,14 @@ class _Compiler:
         name = node.id
         if name in self.locals:
             self.emit(Operation.LOCAL, self.locals[name])
-        elif name in VARIABLES:
-            self.emit(Operation.VARIABLE, VARIABLES.index(name))
+        elif name in self._variables:
+            self.emit(Operation.VARIABLE, self._variables.index(name))
         elif name in CONSTANTS:
             self._constant(CONSTANTS[name])
         elif name in FUNCTIONS:
             raise self._source.error(node, f"{name}(…)", f'"{name}"', "Give the function its argument.")
         else:
-            known = (*VARIABLES, *CONSTANTS, *self.locals)
+            known = (*self._variables, *CONSTANTS, *self.locals)
             hint = "Define it in let before it is used."
             raise self._unknown(node, "one of", known, name, hint)
         return 1

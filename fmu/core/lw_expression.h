@@ -1,0 +1,39 @@
+/* Expressions compiled to postfix programs for a stack machine. */
+#ifndef LW_EXPRESSION_H
+#define LW_EXPRESSION_H
+
+#include <stdint.h>
+
+#include "lw_math.h"
+
+/* Machine limits; whoever writes a program has to keep to them. */
+enum { LW_EXPRESSION_STACK = 64, LW_EXPRESSION_LOCALS = 64 };
+
+enum { /* operations; the operand, where there is one, in brackets */
+    LW_CONSTANT, /* push constants[operand] */
+    LW_VARIABLE, /* push the variable [operand] */
+    LW_LOCAL,    /* push the local value [operand] */
+    LW_DEFINE,   /* pop into the local value [operand] */
+    LW_RESULT,   /* pop into the result [operand] */
+    LW_NEGATE, LW_ADD, LW_SUBTRACT, LW_MULTIPLY, LW_DIVIDE,
+    LW_POWER,         /* real exponent */
+    LW_POWER_INTEGER, /* exponent [operand], by repeated multiplication */
+    LW_SIN, LW_COS, LW_TAN, LW_ASIN, LW_ACOS, LW_ATAN, LW_SINH, LW_COSH, LW_TANH,
+    LW_EXP, LW_LOG, LW_SQRT, LW_ABS,
+    LW_ATAN2, LW_HYPOT, LW_MIN, LW_MAX,
+    LW_TABLE /* a curve of cubic pieces, at constants + [operand]: number of pieces m, period or 0, the m + 1
+                places where they begin and end, 4 coefficients of each; held beyond its ends */
+};
+
+/* A value that depends on one variable, and its first two derivatives. */
+typedef struct { double value, rate, change; } lw_jet;
+
+/* Run the program from `code` to `end`, pairs of operation and operand; results that it does not give stay. */
+void lw_expression_run(const int32_t *code, const int32_t *end, const double *constants,
+                       const double *variables, double *results);
+
+/* The same with a program of one variable, whose result 0 is returned as what it is at `at`. */
+LW_API void lw_expression_jet(const int32_t *code, const int32_t *end, const double *constants, double at,
+                              lw_jet *result);
+
+#endif

@@ -1,0 +1,58 @@
+"""Curves through the points of a table, as the cubic pieces of ``lw_expression.h``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from linkwind.spatial import Array
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A function of one variable that goes through points; beyond its ends it keeps their values.
+
+    Attributes:
+        points: places, ascending, and values.
+        smooth: monotone cubic, with a continuous derivative; else straight lines.
+        periodic: goes on as it was; the last value is the first.
+    """
+
+    points: tuple[tuple[float, float], ...]
+    smooth: bool = False
+    periodic: bool = False
+
+    def layout(self) -> list[float]:
+        """Return number of pieces, period or 0, the places, and four coefficients of each piece."""
+        x, y = np.array(self.points).T
+        width, slope = np.diff(x), np.diff(y) / np.diff(x)
+        pieces = np.zeros((len(width), 4))
+        pieces[:, 0], pieces[:, 1] = y[:-1], slope
+        if self.smooth:
+            at = _monotone(width, slope, periodic=self.periodic)
+            pieces[:, 1] = at[:-1]
+            pieces[:, 2] = (3.0 * slope - 2.0 * at[:-1] - at[1:]) / width
+            pieces[:, 3] = (at[:-1] + at[1:] - 2.0 * slope) / width**2
+        period = float(x[-1] - x[0]) if self.periodic else 0.0
+        return [float(len(width)), period, *x.tolist(), *pieces.ravel().tolist()]
+
+
+def _monotone(width: Array, slope: Array, *, periodic: bool) -> Array:
+    """Return slopes at the points that keep the curve as monotone as the points are; flat at its ends.
+
+    Weighted harmonic means: F. N. Fritsch, J. Butland 1984, doi:10.1137/0905021.
+    """
+    at = np.zeros(len(slope) + 1)
+    at[1:-1] = _mean(width[:-1], width[1:], slope[:-1], slope[1:])
+    if periodic:
+        at[0] = at[-1] = _mean(width[-1:], width[:1], slope[-1:], slope[:1])[0]
+    return at
+
+
+def _mean(before: Array, after: Array, left: Array, right: Array) -> Array:
+    first, second = 2.0 * after + before, after + 2.0 * before
+    same = left * right > 0.0
+    product = np.where(same, left * right, 1.0)
+    mean: Array = np.where(same, (first + second) * product / (first * right + second * left), 0.0)
+    return mean
