@@ -102,6 +102,13 @@ def test_growth_of_a_difference_in_velocity(tmp_path: Path) -> None:
     largest = next(f for f in found.fields if (f.topic, f.field) == ("/state", "motion.position"))
     assert (largest.absolute, largest.t) == (pytest.approx(0.4 * d), 0.4)
     assert any("scenario: bodies.0.velocity.0: 1.0 | 1.00000095" in remark for remark in found.remarks)
+    assert found.curves is not None
+    np.testing.assert_allclose(found.curves.distance["motion.position"], d * found.curves.t, atol=1e-14)
+    page = tmp_path / "growth.html"
+    assert CliRunner().invoke(app, ["diff", str(one), str(other), "--plot", str(page)]).exit_code == 5
+    text = page.read_text()
+    assert "velocity [m\\u002fs]" in text
+    assert repr(float(found.curves.distance["motion.position"][-1])) in text
     # What counts as none is relative to the largest value: here the final velocity and position.
     assert diff(one, other, rtol=1e-5).identical
     assert not diff(one, other, rtol=1e-8).identical

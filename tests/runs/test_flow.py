@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from linkwind.bus.zenoh import ZenohDynamicsLink, ZenohProviderLink, loopback_en
 from linkwind.dynamics.recorder import Recorder
 from linkwind.dynamics.service import DynamicsService
 from linkwind.frames import decode
+from linkwind.log import grid
 from linkwind.log.export import export_csv
 from linkwind.log.reader import open_log
 from linkwind.log.recover import recover
@@ -135,10 +137,37 @@ def test_a_recovered_log_is_verified_up_to_its_end(tmp_path: Path, monkeypatch: 
     assert "not complete" in found.remark
 
 
-def test_a_difference_of_runs_passes_frames_by(log: Path) -> None:
-    found = diff(log, log)
-    assert found.identical
-    assert found.remarks == ("/flow/aero is not compared",)
+def test_frames_of_two_runs_are_compared(log: Path, tmp_path: Path) -> None:
+    assert diff(log, log).identical
+    assert diff(log, log, rtol=1e-3).identical
+    assert diff(log, log).remarks == ()
+
+    def edit(topic: str, number: int, payload: bytes) -> bytes:
+        if (topic, number) != ("/flow/aero", 3):
+            return payload
+        frame = list(open_log(log).frames("aero"))[2]
+        pressure = frame.pressure.copy()
+        pressure[1, 2] = np.nextafter(pressure[1, 2], np.float32(np.inf))
+        pressure[2, 0] += np.float32(0.25)
+        return grid.encode(replace(frame, pressure=pressure))
+
+    other = rewrite(log, tmp_path / "edited.mcap", edit)
+    found = diff(log, other)
+    (only,) = found.fields
+    frame = list(open_log(log).frames("aero"))[2]
+    assert found.first == only.first
+    assert (only.topic, only.field, only.messages, only.t) == (
+        "/flow/aero",
+        "pressure",
+        1,
+        frame.time_ns / 1e9,
+    )
+    assert (only.first.step, only.first.element, only.first.ulp) == (frame.step, frame.shape[1] + 2, 1)
+    assert only.absolute == pytest.approx(0.25, rel=1e-4)
+    scale = max(float(np.abs(each.pressure).max()) for each in open_log(log).frames("aero"))
+    assert only.relative == pytest.approx(only.absolute / scale, rel=0.3)
+    assert diff(log, other, rtol=1.01 * only.relative).identical
+    assert not diff(log, other, rtol=0.9 * only.relative).identical
 
 
 def test_a_replay_shows_the_frames_as_they_were_sent(log: Path) -> None:

@@ -101,6 +101,7 @@ def diff(
     rtol: Annotated[
         float, typer.Option(min=0.0, help="Ignore differences up to this part of a field's largest value.")
     ] = 0.0,
+    plot: Annotated[Path | None, typer.Option(help="Draw how the difference grows, as an HTML page.")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Show what differs between two logs, where it starts and how it grows; exit code 5 if they differ.
@@ -110,6 +111,10 @@ def diff(
     from linkwind.runs.diff import diff as compare
 
     found = compare(one, other, rtol=rtol)
+    if plot is not None and found.curves is not None:
+        from linkwind.report.growth import write_growth
+
+        write_growth(plot, f"{one} and {other}", found.curves.t, found.curves.distance)
     if as_json:
         typer.echo(json.dumps(found.as_json()))
     for remark in found.remarks:

@@ -169,13 +169,13 @@ def between_frames(topic: str, step_ns: int, recorded: bytes, again: bytes) -> D
         if differing.size:
             i = int(differing[0])
             values = one.flat[i].item(), other.flat[i].item()
-            distance = ulp(*values) if one.itemsize == 8 else _single_ulp(*(int(side[i]) for side in bits))
+            distance = ulp(*values) if one.itemsize == 8 else single_ulp(*(int(side[i]) for side in bits))
             return Difference(*at, field, i if one.ndim else None, None, *values, distance)
     lengths = (f"{len(recorded)} bytes", f"{len(again)} bytes")
     return Difference(*at, "encoding", None, None, *lengths, None)
 
 
-def _single_ulp(one: int, other: int) -> int | None:
+def single_ulp(one: int, other: int) -> int | None:
     """Return the distance of two float32, given as the int32 of the same bits; None if one is not finite."""
     sizes = one & 0x7FFF_FFFF, other & 0x7FFF_FFFF
     if max(sizes) >= 0x7F80_0000:

@@ -13,12 +13,14 @@ import numpy as np
 
 from linkwind.errors import LogError
 from linkwind.log.compare import FieldDifference, Matched, deviation, differences, match
-from linkwind.log.contents import FLOW, MOTION, STATE, STEP, WRENCH
+from linkwind.log.contents import MOTION, STATE, STEP, WRENCH
 from linkwind.log.difference import Difference, printable
 from linkwind.log.reader import Log, open_log
 from linkwind.mechanism import build
 from linkwind.runs.comparison import finder
+from linkwind.runs.framediff import frame_differences
 from linkwind.scenario import from_json
+from linkwind.spatial import Array
 
 INTERVALS = 8  # of time, into which the growth is divided
 GROWING = ("motion.position", "motion.orientation", "motion.linear", "motion.angular", "wrench")
@@ -38,6 +40,19 @@ class Growth:
 
 
 @dataclass(frozen=True)
+class Curves:
+    """The largest difference of the accepted states at each communication point.
+
+    Attributes:
+        t: simulation time [s], shape (k,).
+        distance: absolute difference by field of State, each of shape (k,).
+    """
+
+    t: Array
+    distance: dict[str, Array]
+
+
+@dataclass(frozen=True)
 class Compared:
     """What differs between two logs.
 
@@ -45,6 +60,7 @@ class Compared:
         first: the first difference, None if there is none.
         fields: all fields that differ.
         growth: from the first difference on; None if there is none.
+        curves: the same at every communication point.
         points: communication points that both logs have.
         remarks: in which way the two runs cannot be the same, and what was not compared.
     """
@@ -52,6 +68,7 @@ class Compared:
     first: Difference | None
     fields: tuple[FieldDifference, ...]
     growth: Growth | None
+    curves: Curves | None
     points: int
     remarks: tuple[str, ...]
 
@@ -105,14 +122,23 @@ def diff(one: Path, other: Path, *, rtol: float = 0.0) -> Compared:
             topic, pairs, names, rtol=rtol, skip=frozenset() if same_step else frozenset({"step"})
         )
     ]
+    if same_step:
+        for provider in _flows(*logs):
+            fields += frame_differences(*logs, provider, rtol)
     states = matched.get(STATE)
     if states is None or not len(states.time_ns):
         raise LogError(f"{other}: expected a time in common with {one}; got none. Compare runs that overlap.")
     first = min((found.first for found in fields), key=lambda d: d.time_ns, default=None)
     if same_step and all(log.complete for log in logs) and (end := _end(states, *logs)) is not None:
         first = first or end
-    growth = _growth(states, fields) if fields else None
-    return Compared(first, tuple(fields), growth, len(states.time_ns), tuple(remarks))
+    curves = _curves(states) if fields else None
+    growth = _growth(states, fields, curves) if curves else None
+    return Compared(first, tuple(fields), growth, curves, len(states.time_ns), tuple(remarks))
+
+
+def _flows(one: Log, other: Log) -> list[str]:
+    """Return the providers of whose fluid both logs have frames."""
+    return sorted({*one.flows} & {*other.flows})
 
 
 def _refuse_other_bodies(one: Log, other: Log) -> None:
@@ -152,8 +178,6 @@ def _remarks(one: Log, other: Log) -> Iterator[str]:
 
 
 def _not_compared(one: Log, other: Log) -> Iterator[str]:
-    for provider in sorted({*one.flows} & {*other.flows}):
-        yield f"{FLOW}{provider} is not compared"
     for topic in sorted(one.topics.keys() ^ other.topics.keys()):
         yield f"only {one.path if topic in one.topics else other.path} has {topic}"
 
@@ -179,16 +203,21 @@ def _end(states: Matched, one: Log, other: Log) -> Difference | None:
     return Difference(STATE, step, time_ns + step_ns, 0, "message", None, None, there[0], there[1], None)
 
 
-def _growth(states: Matched, fields: list[FieldDifference]) -> Growth:
+def _curves(states: Matched) -> Curves:
+    names = [name for name in GROWING if name in states.one and states.one[name].size]
+    distance = {name: deviation(states.one[name], states.other[name]).max(axis=1) for name in names}
+    return Curves(states.time_ns / 1e9, distance)
+
+
+def _growth(states: Matched, fields: list[FieldDifference], curves: Curves) -> Growth:
     """Return the largest differences of the states in intervals from the first difference to the end."""
     start = min(found.first.time_ns for found in fields)
     edges = np.linspace(start, max(start, int(states.time_ns[-1])), INTERVALS + 1)
-    names = tuple(name for name in GROWING if name in states.one and states.one[name].size)
-    distance = {name: deviation(states.one[name], states.other[name]).max(axis=1) for name in names}
     rows = []
     for i, (low, high) in enumerate(pairwise(edges)):
         after = states.time_ns >= low if i == 0 else states.time_ns > low
         inside = after & (states.time_ns <= high)
         if inside.any():
-            rows.append((float(high) / 1e9, tuple(float(distance[name][inside].max()) for name in names)))
-    return Growth(names, tuple(rows))
+            largest = tuple(float(values[inside].max()) for values in curves.distance.values())
+            rows.append((float(high) / 1e9, largest))
+    return Growth(tuple(curves.distance), tuple(rows))
