@@ -12,7 +12,13 @@ from pathlib import Path
 import pytest
 
 from linkwind.aero.service import serve
-from linkwind.bus.zenoh import ZenohDynamicsLink, ZenohProviderLink, ZenohRouter, loopback_endpoint
+from linkwind.bus.zenoh import (
+    ZenohDynamicsLink,
+    ZenohListener,
+    ZenohProviderLink,
+    ZenohRouter,
+    loopback_endpoint,
+)
 from linkwind.credentials import Identity
 from linkwind.credentials.authority import DEFAULT_ROLES, Role, issue
 from linkwind.credentials.checks import load_identity
@@ -143,6 +149,19 @@ def test_dynamics_without_tls_is_not_taken_for_one_with(certs: Path, dynamics: S
     provider.join(PATIENCE)
     with pytest.raises(TrustError, match=r"there is no TLS. Start that side with --tls DIR"):
         raise provider.error or AssertionError
+
+
+def test_recorder_is_told_as_well(certs: Path, endpoint: str, dynamics: Start) -> None:
+    dynamics()
+    for at, identity, error in (
+        (endpoint.replace("tls/", "tcp/"), None, "there is TLS, and this side has none"),
+        (endpoint, load_identity(certs / "strangers", "observer"), "not to be trusted"),
+    ):
+        with (
+            closing(ZenohListener([], [at], identity=identity)) as listener,
+            pytest.raises(TrustError, match=error),
+        ):
+            listener.find(PATIENCE)
 
 
 def test_dynamics_of_another_name_is_not_believed(

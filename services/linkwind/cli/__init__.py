@@ -25,6 +25,7 @@ from linkwind.cli import (
     view,
 )
 from linkwind.errors import LinkwindError
+from linkwind.interrupt import terminate_as_interrupt
 
 app = typer.Typer(
     name="linkwind",
@@ -67,7 +68,8 @@ def version(
 def main() -> None:
     """Run the command line; an error is one message and an exit code that tells its kind."""
     try:
-        app()
+        with terminate_as_interrupt():
+            app()
     except LinkwindError as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(error.exit_code)

@@ -95,7 +95,6 @@ def replay(
         raise typer.BadParameter("expected --substitute with --set, --force-fmu and --out; got none")
     from linkwind.credentials import identity_in
     from linkwind.log.reader import open_log
-    from linkwind.runs.keeping import terminate_as_interrupt
     from linkwind.runs.playback import Steering
     from linkwind.runs.replay import Selection
     from linkwind.runs.replay import replay as replay_log
@@ -110,16 +109,15 @@ def replay(
     def job(progress: Callable[[float], None]) -> Replayed:
         return replay_log(opened, selection, **ends, identity=shown, progress=progress, steering=steering)
 
-    with terminate_as_interrupt():
-        if opened.damage is not None:
-            typer.echo(f"note: the log is not complete: {opened.damage.text}", err=True)
-        if as_json:
-            done = job(lambda t: None)
-        else:
-            where = ", ".join([*ends["listen"], *ends["connect"]])
-            typer.echo(f"waiting at {where} for a subscriber of linkwind/v1/{opened.run}/**")
-            with keys(_actions(steering)):
-                done = _behind_a_bar(opened, selection.start or 0.0, end, job)
+    if opened.damage is not None:
+        typer.echo(f"note: the log is not complete: {opened.damage.text}", err=True)
+    if as_json:
+        done = job(lambda t: None)
+    else:
+        where = ", ".join([*ends["listen"], *ends["connect"]])
+        typer.echo(f"waiting at {where} for a subscriber of linkwind/v1/{opened.run}/**")
+        with keys(_actions(steering)):
+            done = _behind_a_bar(opened, selection.start or 0.0, end, job)
     if not done.heard:
         typer.echo("note: at the end nobody listened any more", err=True)
     if as_json:

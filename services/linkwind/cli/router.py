@@ -36,10 +36,9 @@ def router(
 
     from linkwind.bus.zenoh import ZenohRouter
     from linkwind.credentials import identity_in
-    from linkwind.runs.keeping import terminate_as_interrupt
 
     shown = identity_in(tls, "router")
     where = listen or ([] if connect else [default_endpoint(tls)])
-    with terminate_as_interrupt(), closing(ZenohRouter(where, connect or [], name or ["aero"], shown)):
+    with closing(ZenohRouter(where, connect or [], name or ["aero"], shown)):
         typer.echo(f"passing messages on at {', '.join([*where, *(connect or [])])}")
         signal.pause()

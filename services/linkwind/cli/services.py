@@ -51,24 +51,22 @@ def aero(
     from linkwind.aero.service import session
     from linkwind.bus.zenoh import ZenohProviderLink
     from linkwind.credentials import identity_in
-    from linkwind.runs.keeping import terminate_as_interrupt
 
     shown = identity_in(tls, name)
     if not connect and not listen:
         connect = [default_endpoint(tls)]
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     link = partial(ZenohProviderLink, connect or [], listen or [], run, name=name, identity=shown)
-    with terminate_as_interrupt():
-        while True:
-            try:
-                _serve(link(), session(name, force_fmu), start_timeout)
-            except LinkwindError as error:
-                if not stay:
-                    raise
-                logging.error("error: %s", error)
+    while True:
+        try:
+            _serve(link(), session(name, force_fmu), start_timeout)
+        except LinkwindError as error:
             if not stay:
-                return
-            time.sleep(PAUSE)
+                raise
+            logging.error("error: %s", error)
+        if not stay:
+            return
+        time.sleep(PAUSE)
 
 
 def _serve(link: ZenohProviderLink, provider: ProviderSession, start_timeout: float) -> None:

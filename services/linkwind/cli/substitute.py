@@ -88,13 +88,11 @@ def _dynamics(log: Log, overrides: Sequence[str], out: Path | None, as_json: boo
 
 def _answer(log: Log, listen: Sequence[str], connect: Sequence[str], tls: Path | None, as_json: bool) -> None:
     """Give the recorded forces to dynamics elsewhere."""
-    from linkwind.runs.keeping import terminate_as_interrupt
     from linkwind.runs.live_dynamics import answer_dynamics
 
     if not as_json:
         typer.echo(f"waiting for a dynamics at {', '.join([*listen, *connect])}")
-    with terminate_as_interrupt():
-        last = answer_dynamics(log, listen, connect, tls)
+    last = answer_dynamics(log, listen, connect, tls)
     typer.echo(json.dumps({"steps": last}) if as_json else f"answered up to step {last}, the last one")
 
 

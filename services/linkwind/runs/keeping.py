@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import signal
-from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 from typing import Generic, TypeVar
 
 from linkwind.bus.base import DynamicsLink
 from linkwind.errors import LinkwindError
+from linkwind.interrupt import terminate_as_interrupt
 from linkwind.log.writer import LogWriter
 
 T = TypeVar("T")
@@ -68,17 +67,3 @@ def _report(log: Path, report: Path) -> str:
     except LinkwindError as error:
         return str(error)
     return ""
-
-
-@contextmanager
-def terminate_as_interrupt() -> Iterator[None]:
-    """Let SIGTERM end the block the way Ctrl-C does, so that the log is closed and nobody is left waiting."""
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from linkwind.credentials import Identity
 from linkwind.errors import RefusedError, StoppedError
+from linkwind.interrupt import terminate_as_interrupt
 from linkwind.listening import Described, described, ended
 from linkwind.log.contents import END, RUN, STATE
 from linkwind.log.heard import HeardLog
 from linkwind.runs import folder as folders
-from linkwind.runs.keeping import terminate_as_interrupt
 from linkwind.scenario import Scenario, from_json
 from linkwind.schema import SHA256
 

@@ -5,16 +5,43 @@ from __future__ import annotations
 import socket
 import ssl
 import time
+from collections.abc import Sequence
+
+import zenoh
 
 from linkwind.credentials import Identity
 from linkwind.errors import TrustError
 
+DOUBT = 1.0  # s without a connection after which we look why, and again
 PATIENCE = 3.0  # s for the other side's part of a TLS hand-shake
 VERDICT = 1.0  # s in which the other side rejects a certificate: TLS 1.3 tells after the hand-shake
 AGAIN = 0.3  # s between two looks: one alone may meet a process that is just ending
 # Makes the hello longer than 790 bytes. An end without TLS takes its first two for that length, and hangs up
 # at the content as soon as it is there, instead of waiting for more.
 LONG_HELLO = [f"linkwind-{i:03}-{'x' * 32}" for i in range(30)]
+
+
+class Doubt:
+    """Looks, as long as a session has no connection, whether it can ever get one."""
+
+    def __init__(self, session: zenoh.Session, connect: Sequence[str], identity: Identity | None) -> None:
+        """Remember what the session connects to, and what it shows."""
+        self._session, self._connect, self._identity = session, connect, identity
+        self._at = time.monotonic() + DOUBT
+
+    def check(self) -> None:
+        """Look now and then.
+
+        Raises:
+            TrustError: what we connect to will never let us in, or must not be let in.
+        """
+        if time.monotonic() < self._at:
+            return
+        info = self._session.info
+        if not any(True for _ in (*info.peers_zid(), *info.routers_zid())):
+            for endpoint in self._connect:
+                check_trust(endpoint, self._identity)
+        self._at = time.monotonic() + DOUBT
 
 
 def check_trust(endpoint: str, identity: Identity | None) -> None:

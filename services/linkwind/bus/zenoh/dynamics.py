@@ -132,7 +132,7 @@ class ZenohDynamicsLink(Endpoint):
                 return False
             # Not a condition variable: a signal in the middle of one leaves it in pieces.
             time.sleep(PAUSE)
-            self._check_trust()
+            self._doubt.check()
             poll()
         return True
 

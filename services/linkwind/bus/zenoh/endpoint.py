@@ -10,13 +10,12 @@ import zenoh
 from zenoh.handlers import FifoChannel
 
 from linkwind.bus.base import PREFIX
-from linkwind.bus.zenoh.diagnosis import check_trust
+from linkwind.bus.zenoh.diagnosis import Doubt
 from linkwind.bus.zenoh.session import Security, open_session
 from linkwind.errors import LinkwindError
 from linkwind.protocol import fault_error
 
 TICK = 0.1  # s between two looks of the watchdog
-DOUBT = 1.0  # s without a connection after which we look why, and again
 
 
 class Endpoint:
@@ -27,8 +26,7 @@ class Endpoint:
     ) -> None:
         self._session = open_session(listen, connect, region, security)
         self._connect = connect
-        self._identity = security.identity if security else None
-        self._doubt_at = time.monotonic() + DOUBT
+        self._doubt = Doubt(self._session, connect, security.identity if security else None)
         self._trouble: LinkwindError | None = None
         self._reading = False
         self._closing = threading.Event()
@@ -53,15 +51,6 @@ class Endpoint:
         )
         self._token = liveliness.declare_token(f"{PREFIX}/{run}/alive/{participant}")
         self._watchdog.start()
-
-    def _check_trust(self) -> None:
-        """Raise TrustError if what we connect to will never let us in, or must not be let in."""
-        if time.monotonic() > self._doubt_at:
-            info = self._session.info
-            if not any(True for _ in (*info.peers_zid(), *info.routers_zid())):
-                for endpoint in self._connect:
-                    check_trust(endpoint, self._identity)
-            self._doubt_at = time.monotonic() + DOUBT
 
     def _on_fault(self, sample: zenoh.Sample) -> None:
         try:

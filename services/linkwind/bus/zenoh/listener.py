@@ -11,6 +11,7 @@ from zenoh.handlers import FifoChannel
 
 from linkwind.bus.base import PREFIX
 from linkwind.bus.zenoh.access import of_guest
+from linkwind.bus.zenoh.diagnosis import Doubt
 from linkwind.bus.zenoh.session import OBSERVER, Security, key_segment, open_session
 from linkwind.bus.zenoh.stream import END
 from linkwind.credentials import Identity
@@ -56,6 +57,7 @@ class ZenohListener:
         self._ends = [*listen, *connect]
         security = Security(identity, of_guest()) if identity else None
         self._session = open_session(listen, connect, OBSERVER, security)
+        self._doubt = Doubt(self._session, connect, identity)
         self._log = self._session.declare_subscriber(f"{PREFIX}/{self._run}/log/**", FifoChannel(WAITING))
         self._gone: set[str] = set()
         self._presence = self._session.liveliness().declare_subscriber(
@@ -76,6 +78,7 @@ class ZenohListener:
         Raises:
             LostError: there is none.
             ParticipantError: there are several.
+            TrustError: the other side's TLS or certificate, or ours, will never do.
         """
         end = time.monotonic() + timeout
         while time.monotonic() < end:
@@ -93,6 +96,7 @@ class ZenohListener:
                 )
             for self._run, payload in found.items():
                 return bytes(payload)
+            self._doubt.check()
             time.sleep(PAUSE)
         raise LostError(
             f"no run at {', '.join(self._ends)} within {timeout:g} s. Is a dynamics running and listening "

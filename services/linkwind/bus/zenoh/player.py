@@ -9,6 +9,7 @@ import zenoh
 
 from linkwind.bus.base import PREFIX
 from linkwind.bus.zenoh.access import of_hub
+from linkwind.bus.zenoh.diagnosis import Doubt
 from linkwind.bus.zenoh.session import DYNAMICS, Security, open_session
 from linkwind.bus.zenoh.stream import ZenohLogStream, matching, reply
 from linkwind.credentials import ROUTER, Identity
@@ -57,6 +58,7 @@ class ZenohPlayer:
         """
         security = Security(identity, of_hub(participants[1:], ROUTER)) if identity else None
         self._session = open_session(listen, connect, DYNAMICS, security)
+        self._doubt = Doubt(self._session, connect, identity)
         base = f"{PREFIX}/{run}"
         self._declared = [
             self._queryable(rename(f"{base}/control/*"), lambda request: refusal),

@@ -60,7 +60,7 @@ class ZenohProviderLink(Endpoint):
                 raise ParticipantError(f"expected one dynamics; got runs {runs}. Choose one with --run")
             if replies:
                 return bytes(replies[0].ok.payload.to_bytes())
-            self._check_trust()
+            self._doubt.check()
             time.sleep(0.02)
         where = ", ".join(self._connect) or "any endpoint"
         raise LostError(
