@@ -229,7 +229,7 @@ def test_several_problems_are_reported_a_line_each_the_first_few():
 @pytest.mark.parametrize(
     ("source", "start", "advice"),
     [
-        ("two_lnk", "two_lnk: expected a file or one of cylinder, ", 'Use "two_link".'),
+        ("two_lnk", "two_lnk: expected a file or one of andrews, ", 'Use "two_link".'),
         ("no/such/file.toml", "no/such/file.toml: expected a file or one of ", "Check the path."),
         ("a\0b", "a\0b: expected a file or one of ", "Check the path."),
     ],

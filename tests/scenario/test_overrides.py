@@ -118,8 +118,8 @@ def test_every_key_of_every_builtin_can_be_set_to_what_it_is():
             for key, inner in value.items():
                 yield from leaves(inner, f"{path}.{key}")
         elif isinstance(value, list) and value and isinstance(value[0], dict):
-            for inner in value:
-                yield from leaves(inner, f"{path}.{inner['name']}")
+            for i, inner in enumerate(value):
+                yield from leaves(inner, f"{path}.{inner.get('name', i)}")
         else:
             yield path[1:], value
 

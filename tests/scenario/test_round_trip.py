@@ -130,8 +130,11 @@ def test_a_path_and_a_name_load_the_same(tmp_path):
 
 def test_builtin_names():
     assert builtin_names() == [
+        "andrews",
+        "bricard",
         "cylinder",
         "falling_plate",
+        "four_bar",
         "stage_separation",
         "two_link",
         "two_link_field",

@@ -12,26 +12,24 @@ from linkwind.cli.options import DIFFERENT, JsonOption
 from linkwind.errors import InputError
 
 if TYPE_CHECKING:
-    from linkwind.runs.validate import Plot, Row
+    from linkwind.runs.validate import Plot, Row, Suite
+
+CaseOption = Annotated[
+    list[str] | None, typer.Option("--case", metavar="NAME", help="Only this case; repeatable.")
+]
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
     group = typer.Typer(no_args_is_help=True, help="Compare a model with published and exact values.")
     group.command()(flow)
-    group.callback()(_group)
+    group.command()(multibody)
     app.add_typer(group, name="validate")
-
-
-def _group() -> None:
-    """Keep the name of a single command."""
 
 
 def flow(
     short: Annotated[bool, typer.Option("--short", help="A coarser form, below 3 minutes.")] = False,
-    case: Annotated[
-        list[str] | None, typer.Option("--case", metavar="NAME", help="Only this case; repeatable.")
-    ] = None,
+    case: CaseOption = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for flow.html: the table and plots.")
     ] = None,
@@ -43,61 +41,81 @@ def flow(
 
     Example: linkwind validate flow --short --out validation
     """
-    from linkwind.runs import validate
+    from linkwind.runs.validate import FLOW
 
-    chosen = tuple(case or ())
-    for name in chosen:
-        if name not in validate.FLOW:
+    _validate("flow", FLOW, short, tuple(case or ()), out, as_json)
+
+
+def multibody(
+    short: Annotated[bool, typer.Option("--short", help="Shorter and fewer, some 10 s.")] = False,
+    case: CaseOption = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for multibody.html: the table and plots.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Compare the multibody dynamics with published and exact values; exit code 5 if one is off.
+
+    Example: linkwind validate multibody --out validation
+    """
+    from linkwind.runs.validate import MULTIBODY
+
+    _validate("multibody", MULTIBODY, short, tuple(case or ()), out, as_json)
+
+
+def _validate(
+    name: str, suite: Suite, short: bool, chosen: tuple[str, ...], out: Path | None, as_json: bool
+) -> None:
+    for case in chosen:
+        if case not in suite.cases:
             raise InputError(
-                f'--case: expected one of {", ".join(validate.FLOW)}; got "{name}". Use one of these names.'
+                f'--case: expected one of {", ".join(suite.cases)}; got "{case}". Use one of these names.'
             )
-    rows, plots = _run(short, chosen)
+    rows, plots = _run(suite, short, chosen)
     if out is not None:
         from linkwind.runs.validate import page
 
-        page.write(out / "flow.html", f"linkwind validate flow{' --short' if short else ''}", rows, plots)
+        title = f"linkwind validate {name}{' --short' if short else ''}"
+        page.write(out / f"{name}.html", title, rows, plots, suite.remark)
     if as_json:
         typer.echo(json.dumps({"rows": [row.as_json() for row in rows]}))
     else:
-        _show(rows)
+        _show(suite.title, rows)
         if out is not None:
-            typer.echo(str(out / "flow.html"))
+            typer.echo(str(out / f"{name}.html"))
     if any(row.ok is False for row in rows):
         raise typer.Exit(DIFFERENT)
 
 
-def _run(short: bool, chosen: tuple[str, ...]) -> tuple[list[Row], list[Plot]]:
+def _run(suite: Suite, short: bool, chosen: tuple[str, ...]) -> tuple[list[Row], list[Plot]]:
     """Run the cases behind a progress bar on stderr."""
     from rich.console import Console
     from rich.progress import Progress
 
-    from linkwind.runs import validate
-
-    names = [name for name in chosen or validate.FLOW if not (short and name in validate.LONG)]
+    names = suite.names(short, chosen)
     rows: list[Row] = []
     plots: list[Plot] = []
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(next(iter(names), ""), total=len(names))
-        for done, (_, found) in enumerate(validate.flow(short, chosen), start=1):
+        for done, found in enumerate(suite.run(short, chosen), start=1):
             rows += found.rows
             plots += found.plots
             bar.update(task, completed=done, description=names[min(done, len(names) - 1)])
     return rows, plots
 
 
-def _show(rows: list[Row]) -> None:
+def _show(title: str, rows: list[Row]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from linkwind.runs.validate.page import expected, verdict
+    from linkwind.runs.validate.page import HEADINGS, NUMBERS, cells
 
-    table = Table(title="flow against published and exact values")
-    for heading in ("case", "quantity", "value", "reference", "ratio", "", "source"):
-        right = heading in ("value", "reference", "ratio")
+    table = Table(title=title)
+    for heading in HEADINGS:
+        right = heading in NUMBERS
         table.add_column(heading, justify="right" if right else "left", overflow="fold")
     for row in rows:
-        ratio = "" if row.ratio is None or row.kind == "most" else f"{row.ratio:.3f}"
         colour = {True: "green", False: "bold red", None: "dim"}[row.ok]
-        mark = f"[{colour}]{verdict(row)}[/]"
-        table.add_row(row.case, row.quantity, f"{row.value:.4g}", expected(row), ratio, mark, row.source)
+        texts = zip(HEADINGS, cells(row), strict=True)
+        table.add_row(*(text if heading else f"[{colour}]{text}[/]" for heading, text in texts))
     Console().print(table)

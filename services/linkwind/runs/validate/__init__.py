@@ -1,35 +1,61 @@
 """Validation: cases against published and exact values, one module a theme, and what they found.
 
-A case is a function of ``short`` that returns rows and plots; the registry below says its name. ``short``
-is a form for tests: coarser or fewer, a few seconds each.
+A case is a function of ``short`` that returns rows and plots; a suite says its name. ``short`` is a form for
+tests: coarser or fewer, a few seconds each.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 
-from linkwind.runs.validate import balance, cylinder, free, plate
+from linkwind.runs.validate import balance, cylinder, free, multibody, plate
 from linkwind.runs.validate.rows import Curve, Findings, Plot, Row
 
-FLOW: dict[str, Callable[[bool], Findings]] = {
-    **balance.CASES,
-    **plate.CASES,
-    **cylinder.CASES,
-    **free.CASES,
-}
-
-LONG = ("plate normal to a stream", "falling plate")  # cases without a short form
-
-__all__ = ["FLOW", "LONG", "Curve", "Findings", "Plot", "Row", "flow"]
+__all__ = ["FLOW", "MULTIBODY", "Curve", "Findings", "Plot", "Row", "Suite"]
 
 
-def flow(short: bool, chosen: tuple[str, ...] = ()) -> Iterator[tuple[str, Findings]]:
-    """Run the cases of the flow model one after another; yield the name and what each found.
+@dataclass(frozen=True)
+class Suite:
+    """The cases of a command.
 
-    Args:
-        short: whether to run the short form.
-        chosen: names of cases; all if empty.
+    Attributes:
+        title: of its table.
+        cases: by name.
+        long: names of those without a short form.
+        remark: what a reader of the page should know.
     """
-    for name, case in FLOW.items():
-        if name in (chosen or FLOW) and not (short and name in LONG):
-            yield name, case(short)
+
+    title: str
+    cases: Mapping[str, Callable[[bool], Findings]]
+    long: tuple[str, ...] = ()
+    remark: str = ""
+
+    def names(self, short: bool, chosen: tuple[str, ...] = ()) -> list[str]:
+        """Return the names of the cases to run: the chosen ones, or all, that have the form."""
+        return [
+            name
+            for name in self.cases
+            if name in (chosen or self.cases) and not (short and name in self.long)
+        ]
+
+    def run(self, short: bool, chosen: tuple[str, ...] = ()) -> Iterator[Findings]:
+        """Run these cases one after another; yield what each found."""
+        for name in self.names(short, chosen):
+            yield self.cases[name](short)
+
+
+FLOW = Suite(
+    "flow against published and exact values",
+    {**balance.CASES, **plate.CASES, **cylinder.CASES, **free.CASES},
+    ("plate normal to a stream", "falling plate"),
+    "In two dimensions a bluff plate at Re of 1000 and more has more drag than a real one, whose vortices "
+    "break up along the span. After separation the motion of falling bodies is chaotic: means and early "
+    "windows are compared, never late trajectories.",
+)
+
+MULTIBODY = Suite(
+    "multibody dynamics against published and exact values",
+    multibody.CASES,
+    remark="Times are those of the steps of the case, in one process that also did other things.",
+)

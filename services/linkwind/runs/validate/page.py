@@ -15,12 +15,6 @@ table { border-collapse: collapse } td, th { padding: .25rem .6rem; text-align: 
 border-bottom: 1px solid #ddd } td.n { text-align: right; font-variant-numeric: tabular-nums }
 .no { color: #b00020; font-weight: 600 } .yes { color: #1b6e3c } img { max-width: 34rem; margin: .5rem }"""
 
-REMARK = (
-    "In two dimensions a bluff plate at Re of 1000 and more has more drag than a real one, whose vortices "
-    "break up along the span. After separation the motion of falling bodies is chaotic: means and early "
-    "windows are compared, never late trajectories."
-)
-
 
 def verdict(row: Row) -> str:
     """Return ok, off, or reported."""
@@ -31,37 +25,52 @@ def expected(row: Row) -> str:
     """Return what a row's value should be, as text."""
     if row.kind == "most":
         return f"≤ {row.reference:.4g}"
+    if row.kind == "near":
+        return f"{row.reference:.12g} ± {row.tolerance:g}"
     within = "" if row.tolerance is None else f" ± {100 * row.tolerance:g} %"
     return f"{row.reference:.4g}{within}"
 
 
-def write(path: Path, title: str, rows: Sequence[Row], plots: Sequence[Plot]) -> None:
+def cells(row: Row) -> list[str]:
+    """Return the texts of a row below ``HEADINGS``."""
+    value = f"{row.value:.12g}" if row.kind == "near" else f"{row.value:.4g}"
+    ratio = f"{row.ratio:.4f}" if row.kind == "equal" and row.ratio is not None else ""
+    error = f"{row.error:.1e}" if row.kind == "near" else ""
+    seconds = "" if row.seconds is None else f"{row.seconds:.3g}"
+    return [
+        row.case, row.quantity, value, expected(row), ratio or error, verdict(row), seconds, row.source
+    ]  # fmt: skip
+
+
+HEADINGS = ("Case", "Quantity", "Value", "Reference", "Ratio, error", "", "Time [s]", "Source")
+NUMBERS = ("Value", "Reference", "Ratio, error", "Time [s]")
+
+
+def write(path: Path, title: str, rows: Sequence[Row], plots: Sequence[Plot], remark: str = "") -> None:
     """Write the page as one HTML file, pictures inside."""
     body = "".join(_table_row(row) for row in rows)
     pictures = "".join(
         f'<img alt="{html.escape(plot.title)}" src="data:image/png;base64,{_picture(plot)}">'
         for plot in plots
     )
-    names = ("Case", "Quantity", "Value", "Reference", "Ratio", "", "Source")
-    head = "<tr>" + "".join(f"<th>{name}</th>" for name in names) + "</tr>"
+    head = "<tr>" + "".join(f"<th>{name}</th>" for name in HEADINGS) + "</tr>"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(title)}</title>'
-        f"<style>{_STYLE}</style><h1>{html.escape(title)}</h1><table>{head}{body}</table><p>{REMARK}</p>"
+        f"<style>{_STYLE}</style><h1>{html.escape(title)}</h1><table>{head}{body}</table>"
+        f"<p>{html.escape(remark)}</p>"
         f"{pictures}</html>\n",
         encoding="utf-8",
     )
 
 
 def _table_row(row: Row) -> str:
-    ratio = "" if row.ratio is None or row.kind == "most" else f"{row.ratio:.4f}"
     mark = {True: "yes", False: "no", None: ""}[row.ok]
-    cells = [
-        f"<td>{html.escape(row.case)}</td><td>{html.escape(row.quantity)}</td>",
-        f'<td class="n">{row.value:.4g}</td><td class="n">{expected(row)}</td><td class="n">{ratio}</td>',
-        f'<td class="{mark}">{verdict(row)}</td><td>{html.escape(row.source)}</td>',
-    ]
-    return f"<tr>{''.join(cells)}</tr>"
+    found = ""
+    for heading, text in zip(HEADINGS, cells(row), strict=True):
+        style = "n" if heading in NUMBERS else "" if heading else mark
+        found += f'<td class="{style}">{html.escape(text)}</td>'
+    return f"<tr>{found}</tr>"
 
 
 def _picture(plot: Plot) -> str:
@@ -75,9 +84,13 @@ def _picture(plot: Plot) -> str:
         if curve.published:
             axes.plot(curve.x, curve.y, "o", markerfacecolor="none", label=curve.label)
         else:
-            axes.plot(curve.x, curve.y, "-", linewidth=1.2, label=curve.label)
-    low, high = _range(plot)
-    axes.set(title=plot.title, xlabel=plot.x, ylabel=plot.y, ylim=(low, high))
+            style = "o-" if plot.scale == "loglog" else "-"
+            axes.plot(curve.x, curve.y, style, linewidth=1.2, label=curve.label)
+    axes.set(title=plot.title, xlabel=plot.x, ylabel=plot.y)
+    if plot.scale == "linear":
+        axes.set(ylim=_range(plot))
+    else:
+        axes.set(yscale="log", xscale="log" if plot.scale == "loglog" else "linear")
     axes.legend(fontsize="small")
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=130)
