@@ -197,10 +197,14 @@ double lw_closure_gap(const lw_multibody *mb, const lw_closure *c, const lw_unal
     return sqrt(square);
 }
 
-void lw_multibody_closures(lw_multibody *mb, const double *state, double *value, double *jacobian) {
+void lw_multibody_closure_values(lw_multibody *mb, const double *state) {
     lw_modes(mb, state + mb->nq + mb->nv + 1);
     lw_kinematics(mb, state, state + mb->nq);
     lw_closure_equations(mb);
+}
+
+void lw_multibody_closures(lw_multibody *mb, const double *state, double *value, double *jacobian) {
+    lw_multibody_closure_values(mb, state);
     for (int32_t k = 0; k < mb->rows * mb->nv; ++k) jacobian[k] = 0.0;
     for (int32_t i = 0; i < mb->closures; ++i) {
         const lw_closure *c = &mb->closure[i];

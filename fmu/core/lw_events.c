@@ -259,10 +259,11 @@ static int happen(lw_multibody *mb, int32_t i, double *y, double time, double h,
     return status;
 }
 
-int lw_events_happen(lw_multibody *mb, double *y, double time, double h, const double *wrench, lw_fault *fault) {
+int lw_events_happen(lw_multibody *mb, double *y, double time, double h, double slack, const double *wrench,
+                     lw_fault *fault) {
     for (int32_t i = 0; i < mb->events; ++i) {
         double *values = mb->indicator;
-        int status = indicators(mb, y, time, wrench, values, fault), due = is_due(values[i]);
+        int status = indicators(mb, y, time, wrench, values, fault), due = is_due(values[i] + slack);
         if (!status && due) status = happen(mb, i, y, time, h, wrench, fault);
         if (status) return status;
     }
@@ -271,7 +272,7 @@ int lw_events_happen(lw_multibody *mb, double *y, double time, double h, const d
 
 /* ---- for callers ---- */
 
-int lw_multibody_happen(lw_multibody *mb, double *state, double time, const double *wrench,
+int lw_multibody_happen(lw_multibody *mb, double *state, double time, double slack, const double *wrench,
                         const double *added_inertia, lw_fault *fault) {
     int coordinates = mb->nq + mb->nv, status = lw_inputs_check(mb, state, 1, wrench, added_inertia, fault);
     double *happened = state + coordinates + 1, *y = mb->y;
@@ -280,7 +281,7 @@ int lw_multibody_happen(lw_multibody *mb, double *state, double time, const doub
     lw_bind_added(mb, added_inertia);
     memcpy(y, state, (size_t)coordinates * sizeof(double));
     y[coordinates] = y[coordinates + 1] = 0.0;
-    if ((status = lw_events_happen(mb, y, time, resting, wrench, fault))) return status;
+    if ((status = lw_events_happen(mb, y, time, resting, slack, wrench, fault))) return status;
     memcpy(state, y, (size_t)coordinates * sizeof(double));
     memcpy(happened, mb->happened, (size_t)mb->events * sizeof(double));
     return LW_OK;

@@ -193,7 +193,7 @@ static int watch(lw_run *run, double s, double end, double h) {
         run->interrupted = 1;
         if ((status = locate(run, s, &width))) return status;
         s += width;
-        status = lw_events_happen(mb, mb->y, at(run, s), h, wrench_at(run, s), run->step->fault);
+        status = lw_events_happen(mb, mb->y, at(run, s), h, 0.0, wrench_at(run, s), run->step->fault);
         if (status || !(end > s)) return status;
         remember(mb);
         if ((status = substep(run, s, end - s, (end - s) * run->step->h))) return status;

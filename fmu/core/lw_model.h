@@ -126,6 +126,7 @@ void lw_kinematics(lw_multibody *multibody, const double *q, const double *v);
  * (n,6), on the second bodies at their points as reaction (closures,6). */
 void lw_closures_build(lw_multibody *multibody, const lw_tables *tables);
 void lw_closure_equations(lw_multibody *multibody);
+void lw_multibody_closure_values(lw_multibody *multibody, const double *state);
 void lw_closure_forces(const lw_multibody *multibody, double *wrench, double *reaction);
 double lw_closure_gap(const lw_multibody *multibody, const lw_closure *closure, const lw_unaligned *position,
                       const lw_unaligned *orientation);
@@ -143,8 +144,8 @@ void lw_events_build(lw_multibody *multibody, const lw_tables *tables);
 void lw_modes(lw_multibody *multibody, const double *happened);
 int lw_events_due(lw_multibody *multibody, const double *y, double time, const double *wrench, int *due,
                   lw_fault *fault);
-int lw_events_happen(lw_multibody *multibody, double *y, double time, double h, const double *wrench,
-                     lw_fault *fault);
+int lw_events_happen(lw_multibody *multibody, double *y, double time, double h, double slack,
+                     const double *wrench, lw_fault *fault);
 /* lw_impulse.c: v without what a joint may no longer do, by impulses. */
 int lw_stop_joint(lw_multibody *multibody, const double *q, double *v, lw_link *stopped, lw_fault *fault);
 /* lw_dynamics.c: accelerations, then forces in the joints of the tree and in closures. */

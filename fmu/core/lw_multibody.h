@@ -233,9 +233,9 @@ LW_API int lw_multibody_close(lw_multibody *multibody, double *state, lw_fault *
 LW_API void lw_multibody_energy(lw_multibody *multibody, const double *state, double *kinetic,
                                 double *potential);
 
-/* Let those happen at a state (in place), at `time` [s], that wait for no more. */
-LW_API int lw_multibody_happen(lw_multibody *multibody, double *state, double time, const double *wrench,
-                               const double *added_inertia, lw_fault *fault);
+/* Let those happen at a state (in place), at `time` [s], whose indicators are not below -slack. */
+LW_API int lw_multibody_happen(lw_multibody *multibody, double *state, double time, double slack,
+                               const double *wrench, const double *added_inertia, lw_fault *fault);
 
 /* How far each event is from happening under `wrench` (n,6): values (events), at and above 0 it happens. */
 LW_API int lw_multibody_indicators(lw_multibody *multibody, const double *state, double time,

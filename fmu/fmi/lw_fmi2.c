@@ -1,6 +1,7 @@
 /* Functional Mock-up Interface 2.0. */
 #include "fmi2.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "lw_part.h"
@@ -178,7 +179,14 @@ fmi2Status fmi2EnterEventMode(fmi2Component c) {
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
     ENTER(DISCRETE_STATES);
     if (!info) return (fmi2Status)lw_missing(instance, "fmi2eventInfo");
+    int changed;
+    double next;
+    int status = lw_part_event(instance, &changed, &next);
     memset(info, 0, sizeof *info);
+    if (status) return (fmi2Status)status;
+    info->valuesOfContinuousStatesChanged = changed ? fmi2True : fmi2False;
+    info->nextEventTimeDefined = isfinite(next) ? fmi2True : fmi2False;
+    if (isfinite(next)) info->nextEventTime = next;
     return fmi2OK;
 }
 
@@ -194,8 +202,10 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set_state
     (void)no_set_state_before;
     if (!enter_event_mode || !terminate)
         return (fmi2Status)lw_missing(instance, "enterEventMode or terminateSimulation");
-    *enter_event_mode = *terminate = fmi2False;
-    lw_part_accept(instance);
+    int event;
+    lw_part_accept(instance, &event);
+    *terminate = fmi2False;
+    *enter_event_mode = event ? fmi2True : fmi2False;
     return fmi2OK;
 }
 
@@ -216,8 +226,7 @@ fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx
 
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real indicators[], size_t ni) {
     ENTER(GET_STATES);
-    (void)indicators;
-    return ni ? unsupported(instance, "a model without event indicators") : fmi2OK;
+    return (fmi2Status)lw_get_indicators(instance, indicators, ni);
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx) {

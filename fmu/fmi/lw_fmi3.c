@@ -1,6 +1,8 @@
 /* Functional Mock-up Interface 3.0. */
 #include "fmi3.h"
 
+#include <math.h>
+
 #include "lw_part.h"
 
 #define ENTER(call)                                                                                          \
@@ -276,8 +278,15 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *need_update, fm
     if (!need_update || !terminate || !nominals_changed || !values_changed || !next_event_defined ||
         !next_event)
         return (fmi3Status)lw_missing(instance, "one of the results");
+    int changed;
+    double next;
     *need_update = *terminate = *nominals_changed = *values_changed = *next_event_defined = false;
     *next_event = 0.0;
+    int status = lw_part_event(instance, &changed, &next);
+    if (status) return (fmi3Status)status;
+    *values_changed = changed;
+    *next_event_defined = isfinite(next);
+    if (isfinite(next)) *next_event = next;
     return fmi3OK;
 }
 
@@ -295,8 +304,10 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean no_set_state_
     (void)no_set_state_before;
     if (!enter_event_mode || !terminate)
         return (fmi3Status)lw_missing(instance, "enterEventMode or terminateSimulation");
-    *enter_event_mode = *terminate = false;
-    lw_part_accept(instance);
+    int event;
+    lw_part_accept(instance, &event);
+    *terminate = false;
+    *enter_event_mode = event;
     return fmi3OK;
 }
 
@@ -317,8 +328,7 @@ fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance c, fmi3Float64 derivat
 
 fmi3Status fmi3GetEventIndicators(fmi3Instance c, fmi3Float64 indicators[], size_t n) {
     ENTER(GET_STATES);
-    (void)indicators;
-    return n ? unsupported(instance, "a model without event indicators") : fmi3OK;
+    return (fmi3Status)lw_get_indicators(instance, indicators, n);
 }
 
 fmi3Status fmi3GetContinuousStates(fmi3Instance c, fmi3Float64 x[], size_t n) {
@@ -339,7 +349,7 @@ static fmi3Status count(const lw_instance *instance, size_t *n, size_t value) {
 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n) {
     ENTER(COUNT_STATES);
-    return count(instance, n, 0);
+    return count(instance, n, lw_indicator_count(instance));
 }
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n) {

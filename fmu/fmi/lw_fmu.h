@@ -25,6 +25,7 @@
     X(LINEAR_ACCELERATION, 3 * n) X(ANGULAR_ACCELERATION, 3 * n)                                         \
     X(REACTION_FORCE, 3 * n) X(REACTION_TORQUE, 3 * n)                                                   \
     X(CLOSURE_FORCE, 3 * lw_fmu_closures) X(CLOSURE_TORQUE, 3 * lw_fmu_closures)                         \
+    X(EVENT_TIME, lw_fmu_events) X(EVENT_INDICATOR, lw_fmu_events)                                       \
     X(KINETIC_ENERGY, 1) X(POTENTIAL_ENERGY, 1)
 
 /* A field leaves density, wind, length and span unused (no variable refers to them). */
@@ -72,6 +73,9 @@ extern const int32_t lw_fmu_n, lw_fmu_nq, lw_fmu_nv; /* in aero nq = nv = 0 */
 extern const int32_t lw_fmu_parent[], lw_fmu_order[], lw_fmu_joint_type[], lw_fmu_q_index[], lw_fmu_v_index[];
 extern const double lw_fmu_parent_rotation[], lw_fmu_child_rotation[];
 extern const int32_t lw_fmu_closures, lw_fmu_closure_body[], lw_fmu_closure_rows[];
+extern const int32_t lw_fmu_events, lw_fmu_event_joint[], lw_fmu_event_action[], lw_fmu_event_occasion[];
+extern const int32_t lw_fmu_event_side[];
+extern const double lw_fmu_event_threshold[], lw_fmu_event_restitution[];
 extern const double lw_fmu_closure_point[], lw_fmu_closure_rotation[], lw_fmu_closure_length[];
 extern const int32_t lw_fmu_forces, lw_fmu_force_type[], lw_fmu_force_body[];
 extern const double lw_fmu_force_point[];

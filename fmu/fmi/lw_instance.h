@@ -88,6 +88,8 @@ int lw_get_states(lw_instance *, double *states, size_t count);
 int lw_set_states(lw_instance *, const double *states, size_t count);
 int lw_get_state_derivatives(lw_instance *, double *derivatives, size_t count);
 int lw_get_nominals(lw_instance *, double *nominals, size_t count);
+size_t lw_indicator_count(const lw_instance *);
+int lw_get_indicators(lw_instance *, double *indicators, size_t count);
 
 /* ---- lw_cosimulation.c ---- */
 /* One communication step; *early is set if it ended before its end. */

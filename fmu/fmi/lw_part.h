@@ -34,8 +34,13 @@ int lw_part_update(lw_instance *, unsigned groups);
 int32_t lw_part_pieces(const lw_instance *);
 /* Take one of them, h [s] long. */
 int lw_part_advance(lw_instance *, double h, int32_t pieces);
-/* The present values are those of an accepted point of time. */
-void lw_part_accept(lw_instance *);
+/* The present values are those of an accepted point of time; whether something has to be done about them. */
+void lw_part_accept(lw_instance *, int *event);
+
+/* Model Exchange: number of event indicators, their first value, their group. Do what is due; `changed`: the
+ * states did; `next` is when something happens at a known time [s], infinite for never. */
+size_t lw_part_indicators(const lw_instance *, uint32_t *first, unsigned *group);
+int lw_part_event(lw_instance *, int *changed, double *next);
 
 /* A derivative of an input with respect to time, for the coming step; returns 0 where it is of no use. */
 int lw_part_set_input_derivative(lw_instance *, uint32_t index, int32_t order, double value);

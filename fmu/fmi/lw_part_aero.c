@@ -143,11 +143,13 @@ int32_t lw_part_pieces(const lw_instance *instance) { return (void)instance, 1; 
 
 int lw_part_advance(lw_instance *instance, double h, int32_t pieces) {
     (void)h, (void)pieces;
-    lw_part_accept(instance);
+    int event;
+    lw_part_accept(instance, &event);
     return LW_FMI_OK;
 }
 
-void lw_part_accept(lw_instance *instance) {
+void lw_part_accept(lw_instance *instance, int *event) {
+    *event = 0;
     lw_motion now = motion(instance);
     if (lw_fmu_aero_model == LW_AERO_FIELD) lw_field_commit(&instance->part->field, &now, instance->store);
 }
@@ -177,4 +179,18 @@ double lw_part_scale(const lw_instance *instance, const lw_fmu_variable *variabl
     default: break;
     }
     return scale > 0.0 ? scale : 1.0;
+}
+
+/* ---- events: none ---- */
+
+size_t lw_part_indicators(const lw_instance *instance, uint32_t *first, unsigned *group) {
+    (void)instance;
+    *first = 0, *group = 0;
+    return 0;
+}
+
+int lw_part_event(lw_instance *instance, int *changed, double *next) {
+    (void)instance;
+    *changed = 0, *next = HUGE_VAL;
+    return LW_FMI_OK;
 }

@@ -7,7 +7,11 @@
 
 enum { MAX_ORDER = 3 }; /* of input derivatives */
 enum { PROPOSED, ORDER, RATES }; /* memory: substep of dopri5 [s], order and values of input derivatives */
-enum { RATE = 1, MOTION = 2, ACCELERATION = 4, ENERGY = 8 }; /* groups */
+enum { RATE = 1, MOTION = 2, ACCELERATION = 4, ENERGY = 8, EVENTS = 16 }; /* groups */
+
+static const double drifted = 1e-9;  /* m, rad: loops that are open by more are closed in an event */
+static const double slack = 1e-9;    /* of an indicator that a solver has found the zero of */
+static const double not_yet = -1.0;  /* time of an event */
 
 struct lw_part {
     uint32_t first[LW_DYNAMICS_SECTIONS + 1];
@@ -41,7 +45,10 @@ size_t lw_part_values(void) {
 
 static size_t forces(void) { return 6 * (size_t)lw_fmu_n; }
 
-size_t lw_part_memory(void) { return RATES + MAX_ORDER * forces(); }
+/* When each event happened comes last in the memory. */
+static size_t rates_end(void) { return RATES + MAX_ORDER * forces(); }
+
+size_t lw_part_memory(void) { return rates_end() + (size_t)lw_fmu_events; }
 
 /* What of the mechanism is constant. */
 static lw_tables constants(void) {
@@ -54,13 +61,16 @@ static lw_tables constants(void) {
         .closure_body = lw_fmu_closure_body, .closure_rows = lw_fmu_closure_rows,
         .closure_point = lw_fmu_closure_point, .closure_rotation = lw_fmu_closure_rotation,
         .closure_length = lw_fmu_closure_length, .force_type = lw_fmu_force_type,
-        .force_body = lw_fmu_force_body, .force_point = lw_fmu_force_point};
+        .force_body = lw_fmu_force_body, .force_point = lw_fmu_force_point,
+        .events = lw_fmu_events, .event_joint = lw_fmu_event_joint, .event_action = lw_fmu_event_action,
+        .event_occasion = lw_fmu_event_occasion, .event_side = lw_fmu_event_side,
+        .event_threshold = lw_fmu_event_threshold, .event_restitution = lw_fmu_event_restitution};
     return tables;
 }
 
 size_t lw_part_size(void) {
     lw_tables tables = constants();
-    size_t doubles = lw_state_size() + 1 + (MAX_ORDER + 1 + 3) * forces() + (size_t)lw_fmu_nv;
+    size_t doubles = lw_state_size() + 1 + (size_t)lw_fmu_events + (MAX_ORDER + 1 + 3) * forces() + (size_t)lw_fmu_nv;
     doubles += 6 * (size_t)lw_fmu_closures;
     return (sizeof(lw_part) + 7) / 8 * 8 + doubles * sizeof(double) + (lw_multibody_size(&tables) + 7) / 8 * 8;
 }
@@ -73,7 +83,7 @@ void lw_part_create(lw_instance *instance) {
     LW_DYNAMICS_KNOWN(PLACE) LW_DYNAMICS_CALCULATED(PLACE)
     *first = count;
     double *next = (double *)(void *)((char *)part + (sizeof *part + 7) / 8 * 8);
-    part->state = next, next += lw_state_size() + 1;
+    part->state = next, next += lw_state_size() + 1 + (size_t)lw_fmu_events;
     part->wrench = next, next += (MAX_ORDER + 1) * forces();
     part->out.acceleration = next, next += forces();
     part->out.reaction = next, next += forces();
@@ -83,7 +93,10 @@ void lw_part_create(lw_instance *instance) {
     part->multibody = (lw_multibody *)(void *)next;
 }
 
-void lw_part_restart(lw_instance *instance) { memset(instance->store, 0, lw_part_memory() * sizeof(double)); }
+void lw_part_restart(lw_instance *instance) {
+    memset(instance->store, 0, rates_end() * sizeof(double));
+    for (int32_t i = 0; i < lw_fmu_events; ++i) instance->store[rates_end() + i] = not_yet;
+}
 
 uint32_t lw_part_first(const lw_instance *instance, unsigned section) {
     return instance->part->first[section];
@@ -213,6 +226,8 @@ unsigned lw_part_group(unsigned number) {
     case LW_DYNAMICS_ORIENTATION:
     case LW_DYNAMICS_LINEAR:
     case LW_DYNAMICS_ANGULAR: return MOTION;
+    case LW_DYNAMICS_EVENT_TIME:
+    case LW_DYNAMICS_EVENT_INDICATOR: return EVENTS;
     case LW_DYNAMICS_KINETIC_ENERGY:
     case LW_DYNAMICS_POTENTIAL_ENERGY: return ENERGY;
     default: return ACCELERATION;
@@ -223,6 +238,15 @@ static void load_state(lw_instance *instance) {
     lw_part *part = instance->part;
     memcpy(part->state, AT(Q), lw_state_size() * sizeof(double));
     part->state[lw_state_size()] = instance->store[PROPOSED];
+    memcpy(part->state + lw_state_size() + 1, instance->store + rates_end(),
+           (size_t)lw_fmu_events * sizeof(double));
+}
+
+static void store_state(lw_instance *instance) {
+    const double *state = instance->part->state;
+    memcpy(AT(Q), state, lw_state_size() * sizeof(double));
+    instance->store[PROPOSED] = state[lw_state_size()];
+    memcpy(instance->store + rates_end(), state + lw_state_size() + 1, (size_t)lw_fmu_events * sizeof(double));
 }
 
 static void split(int32_t count, const double *six, double *linear, double *angular) {
@@ -246,11 +270,31 @@ static int update_acceleration(lw_instance *instance) {
     return LW_FMI_OK;
 }
 
+static int update_events(lw_instance *instance) {
+    lw_part *part = instance->part;
+    lw_fault fault;
+    size_t bytes = (size_t)lw_fmu_events * sizeof(double);
+    memcpy(AT(EVENT_TIME), instance->store + rates_end(), bytes);
+    if (!lw_fmu_events) return LW_FMI_OK;
+    pack_wrench(instance, 0.0, part->wrench);
+    int status = lw_multibody_indicators(part->multibody, part->state, instance->time, part->wrench,
+                                         find_added(instance), AT(EVENT_INDICATOR), &fault);
+    return status ? discard(instance, status, &fault) : LW_FMI_OK;
+}
+
 int lw_part_update(lw_instance *instance, unsigned groups) {
     lw_part *part = instance->part;
     lw_multibody *mb = part->multibody;
     load_state(instance);
-    if (groups & RATE) lw_coordinate_rate(mb, part->state, part->state + lw_fmu_nq, AT(DER_Q));
+    if (groups & RATE) {
+        memset(AT(DER_Q), 0, (size_t)lw_fmu_nq * sizeof(double)); /* room that no joint uses */
+        lw_modes(mb, part->state + lw_state_size() + 1);
+        lw_coordinate_rate(mb, part->state, part->state + lw_fmu_nq, AT(DER_Q));
+    }
+    if (groups & EVENTS) {
+        int status = update_events(instance);
+        if (status) return status;
+    }
     if (groups & ENERGY) lw_multibody_energy(mb, part->state, AT(KINETIC_ENERGY), AT(POTENTIAL_ENERGY));
     if (groups & MOTION)
         lw_multibody_motion(mb, part->state, AT(POSITION), AT(ORIENTATION), AT(LINEAR), AT(ANGULAR));
@@ -278,6 +322,13 @@ int32_t lw_part_pieces(const lw_instance *instance) {
     return splits ? instance->integers[LW_SUBSTEPS] : 1;
 }
 
+/* Time [s]; whole nanoseconds are meant where there are nearly whole ones, however the environment sums up its
+ * steps, so that an event falls on the same bit as in a run. */
+static double snapped(double time) {
+    double ns = 1e9 * time, whole = floor(ns + 0.5);
+    return fabs(ns - whole) < 1e-3 ? whole / 1e9 : time;
+}
+
 int lw_part_advance(lw_instance *instance, double h, int32_t pieces) {
     lw_part *part = instance->part;
     double nodes[MAX_ORDER + 1] = {0.0}, work[2];
@@ -289,20 +340,61 @@ int lw_part_advance(lw_instance *instance, double h, int32_t pieces) {
         pack_wrench(instance, nodes[i] * h, part->wrench + (size_t)i * forces());
     }
     lw_macro_step step = {
-        .state = part->state, .h = h, .time = instance->time, .nodes = nodes, .wrenches = part->wrench, .count = order + 1,
+        .state = part->state, .h = h, .time = snapped(instance->time), .nodes = nodes, .wrenches = part->wrench, .count = order + 1,
         .added_inertia = find_added(instance), .integrator = instance->integers[LW_INTEGRATOR],
         .substeps = pieces > 1 ? 1 : instance->integers[LW_SUBSTEPS],
         .rtol = *AT(RTOL), .atol = *AT(ATOL),
         .next = part->state, .work = work, .fault = &fault};
     int status = lw_multibody_advance(part->multibody, &step);
     if (status) return discard(instance, status, &fault);
-    memcpy(AT(Q), part->state, lw_state_size() * sizeof(double));
-    instance->store[PROPOSED] = part->state[lw_state_size()];
-    if (order) memset(instance->store + ORDER, 0, (lw_part_memory() - ORDER) * sizeof(double));
+    store_state(instance);
+    if (order) memset(instance->store + ORDER, 0, (rates_end() - ORDER) * sizeof(double));
     return LW_FMI_OK;
 }
 
-void lw_part_accept(lw_instance *instance) { (void)instance; }
+/* ---- events ---- */
+
+size_t lw_part_indicators(const lw_instance *instance, uint32_t *first, unsigned *group) {
+    *first = FIRST(EVENT_INDICATOR), *group = EVENTS;
+    return (size_t)lw_fmu_events;
+}
+
+/* Largest violation of a loop; 0 without loops. */
+static double loops_open(lw_instance *instance) {
+    lw_multibody *mb = instance->part->multibody;
+    double largest = 0.0;
+    if (!mb->rows) return largest;
+    load_state(instance);
+    lw_multibody_closure_values(mb, instance->part->state);
+    for (int32_t i = 0; i < mb->rows; ++i) largest = fmax(largest, fabs(mb->row[i].value));
+    return largest;
+}
+
+/* A solver knows nothing of the loops: what it has drifted from them is taken back in an event. */
+void lw_part_accept(lw_instance *instance, int *event) { *event = loops_open(instance) > drifted; }
+
+int lw_part_event(lw_instance *instance, int *changed, double *next) {
+    lw_part *part = instance->part;
+    lw_fault fault;
+    int status = LW_OK;
+    load_state(instance);
+    pack_wrench(instance, 0.0, part->wrench);
+    if (lw_fmu_events)
+        status = lw_multibody_happen(part->multibody, part->state, instance->time, slack, part->wrench,
+                                     find_added(instance), &fault);
+    if (!status && part->multibody->rows) status = lw_multibody_close(part->multibody, part->state, &fault);
+    if (status) return discard(instance, status, &fault);
+    *changed = memcmp(AT(Q), part->state, lw_state_size() * sizeof(double)) != 0 ||
+               memcmp(instance->store + rates_end(), part->state + lw_state_size() + 1,
+                      (size_t)lw_fmu_events * sizeof(double)) != 0;
+    store_state(instance);
+    instance->stale |= LW_STALE_ALL & ~LW_STALE_INPUTS;
+    *next = HUGE_VAL;
+    for (int32_t i = 0; i < lw_fmu_events; ++i)
+        if (lw_fmu_event_occasion[i] == LW_ON_TIME && !(instance->store[rates_end() + i] >= 0.0))
+            *next = fmin(*next, lw_fmu_event_threshold[i]);
+    return LW_FMI_OK;
+}
 
 /* ---- scales of differences ---- */
 

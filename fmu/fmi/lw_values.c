@@ -191,3 +191,24 @@ int lw_get_nominals(lw_instance *instance, double *nominals, size_t count) {
     for (size_t k = 0; !status && k < count; ++k) nominals[k] = 1.0;
     return status;
 }
+
+size_t lw_indicator_count(const lw_instance *instance) {
+    uint32_t first;
+    unsigned group;
+    return lw_part_indicators(instance, &first, &group);
+}
+
+int lw_get_indicators(lw_instance *instance, double *indicators, size_t count) {
+    uint32_t first;
+    unsigned group;
+    size_t expected = lw_part_indicators(instance, &first, &group);
+    if (count != expected)
+        return lw_report(instance, LW_FMI_ERROR, "Expected %lu event indicators but was %lu.",
+                         (unsigned long)expected, (unsigned long)count);
+    if (!count) return LW_FMI_OK;
+    if (!indicators) return lw_missing(instance, "eventIndicators");
+    int status = lw_update(instance, group);
+    if (status) return status;
+    memcpy(indicators, instance->values + first, count * sizeof(double));
+    return lw_check_results(instance, indicators, count);
+}

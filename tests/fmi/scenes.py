@@ -118,3 +118,90 @@ step = 1e-3
 def spatial() -> Scenario:
     """Return the scenario; the joint that carries the flap has the flap's name."""
     return loads(SPATIAL, "spatial")
+
+
+EVENTFUL = """
+[time]
+end = 0.4
+[[bodies]]
+name = "crank"
+mass = 1.0
+inertia = 0.1
+angle_deg = 80.0
+angular_velocity = 3.0
+[[bodies]]
+name = "rod"
+mass = 1.0
+inertia = 0.4
+[[bodies]]
+name = "rocker"
+mass = 1.0
+inertia = 0.2
+[[bodies]]
+name = "payload"
+mass = 0.5
+inertia = 0.02
+angle_deg = 0.0
+[[bodies]]
+name = "ball"
+mass = 0.3
+inertia = 0.01
+position = [4.0, 0.2]
+[[joints]]
+name = "pivot"
+type = "revolute"
+parent = "world"
+child = "crank"
+child_point = [-0.5, 0.0]
+[[joints]]
+name = "knee"
+type = "revolute"
+parent = "crank"
+child = "rod"
+parent_point = [0.5, 0.0]
+child_point = [-1.0, 0.0]
+[[joints]]
+name = "ground"
+type = "revolute"
+parent = "world"
+child = "rocker"
+parent_point = [2.0, 0.0]
+child_point = [-0.75, 0.0]
+[[joints]]
+name = "loop"
+type = "revolute"
+parent = "rod"
+child = "rocker"
+parent_point = [1.0, 0.0]
+child_point = [0.75, 0.0]
+[[joints]]
+name = "hook"
+type = "revolute"
+parent = "crank"
+child = "payload"
+parent_point = [0.2, 0.0]
+child_point = [-0.1, 0.0]
+[[joints]]
+name = "guide"
+type = "prismatic"
+parent = "world"
+child = "ball"
+parent_point = [4.0, 0.0]
+axis = [0.0, 1.0]
+stop = [0.0, 1.0]
+restitution = 0.6
+[[events]]
+name = "drop"
+joint = "hook"
+action = "release"
+at = 0.1234
+[aero]
+model = "field"
+[aero.field.payload]
+fy = "-0.1*vy"
+"""
+
+
+def eventful() -> Scenario:
+    """A four-bar that drops something at a time, and a ball that bounces."""
+    return loads(EVENTFUL, "eventful.toml")

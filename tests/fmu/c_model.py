@@ -43,6 +43,10 @@ INPUTS = {
     "dynamics": {"FORCE", "TORQUE", "ADDED_INERTIA"},
     "aero": {"POSITION", "ORIENTATION", "LINEAR", "ANGULAR"},
 }
+INTEGERS = (
+    "closure_body", "closure_rows", "event_joint", "event_action", "event_occasion", "event_side",
+    "force_type", "force_body",
+)  # fmt: skip
 FIXED = {"PARENT_POINT", "CHILD_POINT"}
 
 
@@ -104,6 +108,7 @@ def dynamics(tables: Tables, q0, v0, *, integrator=2, substeps=1, scalar=False, 
     """Return the FMU of a mechanism."""
     n, nq, nv, closures = len(tables.parent), len(q0), len(v0), len(tables.closure_rows)
     forces = len(tables.force_type)
+    events = len(tables.event_joint)
     sections = {
         "MASS": n,
         "INERTIA": 6 * n,
@@ -133,6 +138,8 @@ def dynamics(tables: Tables, q0, v0, *, integrator=2, substeps=1, scalar=False, 
         "REACTION_TORQUE": 3 * n,
         "CLOSURE_FORCE": 3 * closures,
         "CLOSURE_TORQUE": 3 * closures,
+        "EVENT_TIME": events,
+        "EVENT_INDICATOR": events,
         "KINETIC_ENERGY": 1,
         "POTENTIAL_ENERGY": 1,
     }
@@ -140,14 +147,12 @@ def dynamics(tables: Tables, q0, v0, *, integrator=2, substeps=1, scalar=False, 
     start |= {"RTOL": 1e-6, "ATOL": 1e-9, "Q": q0, "V": v0}
     constants = f"const int32_t lw_fmu_n = {n}, lw_fmu_nq = {nq}, lw_fmu_nv = {nv};\n"
     constants += f"const int32_t lw_fmu_closures = {closures}, lw_fmu_forces = {forces};\n"
-    for name in (
-        "parent", "order", "joint_type", "q_index", "v_index", "closure_body", "closure_rows", "force_type",
-        "force_body",
-    ):  # fmt: skip
+    constants += f"const int32_t lw_fmu_events = {events};\n"
+    for name in ("parent", "order", "joint_type", "q_index", "v_index", *INTEGERS):
         constants += _array("int32_t", name, getattr(tables, name))
     for name in (
         "parent_rotation", "child_rotation", "closure_point", "closure_rotation", "closure_length",
-        "force_point",
+        "event_threshold", "event_restitution", "force_point",
     ):  # fmt: skip
         constants += _array("double", name, getattr(tables, name))
     integers = {"INTEGRATOR": integrator, "SUBSTEPS": substeps}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from linkwind.fmi import units
 from linkwind.mechanism import Mechanism
-from linkwind.native.multibody import JOINT_TYPES
+from linkwind.native.multibody import ACTIONS, JOINT_TYPES, NQ, NV
 
 _TYPE_NAMES = {code: name for name, code in JOINT_TYPES.items()}
 # type: suffix, whether it turns, first and number of its coordinates, first and number of its velocities
@@ -18,6 +18,8 @@ _PIECES: dict[str, tuple[tuple[str, bool, int, int, int, int], ...]] = {
     "spherical": (("", True, 0, 4, 0, 3),),
     "free": (("_translation", False, 0, 3, 0, 3), ("_rotation", True, 3, 4, 3, 3)),
 }
+# Of a joint that may be released: its own coordinates at first, then those of a free one.
+_ROOMY = (("", True, 0, NQ["free"], 0, NV["free"]),)
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,9 @@ class Piece:
     @property
     def quantities(self) -> dict[str, units.Quantity]:
         """What the coordinates, velocities, springs and so on measure."""
+        if self.nq == NQ["free"]:
+            whats = ("q", "v", "der_q", "der_v", "stiffness", "damping")
+            return dict.fromkeys(whats, units.COORDINATE)
         if not self.turns:
             return {
                 "q": units.POSITION, "v": units.VELOCITY, "der_q": units.VELOCITY,
@@ -97,13 +102,16 @@ def force_names(mechanism: Mechanism) -> list[str]:
 def pieces(mechanism: Mechanism) -> list[list[Piece]]:
     """Return the pieces of every joint; none for a fixed one."""
     tables = mechanism.tables
+    roomy = set(tables.event_joint[tables.event_action == ACTIONS["release"]].tolist())
     found = []
     for i, name in enumerate(joint_names(mechanism)):
         q, v, of_root = int(tables.q_index[i]), int(tables.v_index[i]), bool(tables.parent[i] < 0)
         found.append(
             [
                 Piece(name, suffix, turns, of_root, q + q_at, nq, v + v_at, nv)
-                for suffix, turns, q_at, nq, v_at, nv in _PIECES[_TYPE_NAMES[int(tables.joint_type[i])]]
+                for suffix, turns, q_at, nq, v_at, nv in (
+                    _ROOMY if i in roomy else _PIECES[_TYPE_NAMES[int(tables.joint_type[i])]]
+                )
             ]
         )
     return found

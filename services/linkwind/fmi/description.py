@@ -23,6 +23,7 @@ LOG_CATEGORIES = {
     "logStatusError": "Calls that return Error: wrong use, values that make no sense",
 }
 # A list of dependencies that is longer is left out, which means "on everything": quadratic in the bodies.
+INDICATOR = "EVENT_INDICATOR"
 LONGEST_LIST = 500
 
 
@@ -74,19 +75,27 @@ def _about(part: Part, version: FmiVersion, token: str) -> dict[str, str]:
         "description": part.description,
         "generationTool": f"linkwind {__version__}",
         "variableNamingConvention": "structured",
-    }
+    } | _event_indicators(part, version)
+
+
+def _event_indicators(part: Part, version: FmiVersion) -> dict[str, str]:
+    """Return their number, which FMI 2 wants; FMI 3 has them as variables."""
+    count = len(part.mechanism.events) if part.provider is None else 0
+    return {"numberOfEventIndicators": str(count)} if version == "2" else {}
 
 
 def _interfaces(root: ET.Element, part: Part, version: FmiVersion, sources: Sequence[str]) -> None:
     """Write what the C layers can do; a force model has neither states nor use for derivatives of inputs."""
     write = _interfaces_2 if version == "2" else _interfaces_3
     mechanism = part.provider is None
-    headings = part.provider is not None and part.provider.model == "field"  # unwrapped from step to step
-    write(root, part.identifier, mechanism, headings, sources)
+    # A field unwraps headings from step to step; loops that have drifted open are closed between steps.
+    headings = part.provider is not None and part.provider.model == "field"
+    needed = headings or (mechanism and bool(part.mechanism.closures))
+    write(root, part.identifier, mechanism, needed, sources)
 
 
 def _interfaces_2(
-    root: ET.Element, identifier: str, mechanism: bool, headings: bool, sources: Sequence[str]
+    root: ET.Element, identifier: str, mechanism: bool, needed: bool, sources: Sequence[str]
 ) -> None:
     shared = {
         "modelIdentifier": identifier,
@@ -94,7 +103,7 @@ def _interfaces_2(
         "canSerializeFMUstate": "true",
         "providesDirectionalDerivative": "true",
     }
-    exchange = {"completedIntegratorStepNotNeeded": _boolean(not headings)}
+    exchange = {"completedIntegratorStepNotNeeded": _boolean(not needed)}
     step = {"canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": _boolean(mechanism)}
     step |= {"maxOutputDerivativeOrder": "1"} if mechanism else {}
     for name, own in (("ModelExchange", exchange), ("CoSimulation", step)):
@@ -104,7 +113,7 @@ def _interfaces_2(
 
 
 def _interfaces_3(
-    root: ET.Element, identifier: str, mechanism: bool, headings: bool, sources: Sequence[str]
+    root: ET.Element, identifier: str, mechanism: bool, needed: bool, sources: Sequence[str]
 ) -> None:
     """Sources are listed in ``buildDescription.xml``."""
     shared = {
@@ -114,7 +123,7 @@ def _interfaces_3(
         "providesDirectionalDerivatives": "true",
         "providesAdjointDerivatives": "true",
     }
-    ET.SubElement(root, "ModelExchange", shared | {"needsCompletedIntegratorStep": _boolean(headings)})
+    ET.SubElement(root, "ModelExchange", shared | {"needsCompletedIntegratorStep": _boolean(needed)})
     step = {
         "canHandleVariableCommunicationStepSize": "true",
         "providesIntermediateUpdate": "true",
@@ -192,7 +201,7 @@ def _variable(parent: ET.Element, at: int, variable: Variable, index: dict[str, 
     attributes = _attributes(at, variable) | _typed(variable)
     if variable.derivative_of:
         attributes["derivative"] = str(index[variable.derivative_of])
-    if variable.causality == "output":
+    if variable.causality == "output" and variable.variability == "continuous":
         attributes["intermediateUpdate"] = "true"
     element = ET.SubElement(parent, "Int32" if variable.integer else "Float64", attributes)
     for length in variable.dimensions:
@@ -213,7 +222,8 @@ def _structure_2(root: ET.Element, variables: list[Variable], index: dict[str, i
 def _structure_3(root: ET.Element, variables: list[Variable], index: dict[str, int]) -> None:
     structure = ET.SubElement(root, "ModelStructure")
     names = {"Derivative": "ContinuousStateDerivative", "InitialUnknowns": "InitialUnknown"}
-    for name, unknowns, initial in _unknowns(variables):
+    indicators = [variable for variable in variables if variable.section == INDICATOR]
+    for name, unknowns, initial in (*_unknowns(variables), ("EventIndicator", indicators, False)):
         for variable in unknowns:
             about = {"valueReference": str(index[variable.name])}
             about |= _dependencies(variable, index, 0, initial=initial)
@@ -225,7 +235,7 @@ def _unknowns(variables: list[Variable]) -> list[tuple[str, list[Variable], bool
     # In the order of the continuous states of the C layers: all q, then all v.
     derivatives = [variable for variable in variables if variable.derivative_of]
     derivatives.sort(key=lambda variable: (variable.section, variable.offset))
-    initial = [variable for variable in variables if variable.initial == "calculated"]
+    initial = [each for each in variables if each.initial == "calculated" and each.section != INDICATOR]
     return [
         ("Output", outputs, False),
         ("Derivative", derivatives, False),

@@ -37,6 +37,8 @@ def variables(scenario: Scenario, mechanism: Mechanism) -> list[Variable]:
         *(variable for piece in every for variable in _states(piece, state, len(mechanism.q0))),
         *_motion(mechanism, structure),
         *_reactions(mechanism, structure),
+        *_closures(mechanism, structure),
+        *_events(mechanism, structure),
         *_energies(structure),
         *_derivatives(mechanism, structure),
         *_body_parameters(mechanism),
@@ -164,6 +166,36 @@ def _reactions(mechanism: Mechanism, structure: Structure) -> Iterator[Variable]
                 yield output(
                     f"{name}.{what}", section, 3 * i, VECTOR, quantity, description, depends, initially
                 )
+
+
+def _closures(mechanism: Mechanism, structure: Structure) -> Iterator[Variable]:
+    for i, joint in enumerate(mechanism.closures):
+        body = max(mechanism.tables.closure_body[i].tolist())
+        depends, initially = structure.acceleration(body), structure.inertia(body)
+        about = f"of parent on child in joint {joint}, which closes a loop, at its point on the child, in W"
+        for what, section, quantity in (
+            ("F", "CLOSURE_FORCE", units.FORCE),
+            ("T", "CLOSURE_TORQUE", units.TORQUE),
+        ):
+            description = f"Reaction {quantity.name.lower()} {about}"
+            yield output(f"{joint}.{what}", section, 3 * i, VECTOR, quantity, description, depends, initially)
+
+
+def _events(mechanism: Mechanism, structure: Structure) -> Iterator[Variable]:
+    n = len(mechanism.bodies)
+    for i, (name, joint) in enumerate(
+        zip(mechanism.events, mechanism.tables.event_joint.tolist(), strict=True)
+    ):
+        body = joint if joint < n else max(mechanism.tables.closure_body[joint - n].tolist())
+        depends, initially = structure.acceleration(body), structure.inertia(body)
+        yield Variable(
+            f"{name}.time", "EVENT_TIME", i, (), "output", "discrete", "calculated", units.TIME_OF_EVENT,
+            f"When {name} happened; -1: not yet",
+        )  # fmt: skip
+        yield Variable(
+            f"{name}.indicator", "EVENT_INDICATOR", i, (), "local", "continuous", "calculated",
+            units.COORDINATE, f"At and above 0 {name} happens", depends=depends, initially=initially,
+        )  # fmt: skip
 
 
 def _energies(structure: Structure) -> Iterator[Variable]:

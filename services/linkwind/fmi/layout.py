@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import accumulate
 
 
-def dynamics_sections(n: int, nq: int, nv: int, closures: int, forces: int) -> dict[str, int]:
+def dynamics_sections(n: int, nq: int, nv: int, closures: int, forces: int, events: int) -> dict[str, int]:
     """Return the size of each section, in order.
 
     Args:
@@ -14,6 +14,7 @@ def dynamics_sections(n: int, nq: int, nv: int, closures: int, forces: int) -> d
         nv: number of degrees of freedom of the tree.
         closures: number of joints that close loops.
         forces: number of force elements.
+        events: number of things that may happen to joints.
     """
     known = {
         "MASS": n, "INERTIA": 6 * n, "PARENT_POINT": 3 * n, "CHILD_POINT": 3 * n, "GRAVITY": 3,
@@ -25,7 +26,7 @@ def dynamics_sections(n: int, nq: int, nv: int, closures: int, forces: int) -> d
         "DER_Q": nq, "DER_V": nv, "POSITION": 3 * n, "ORIENTATION": 4 * n, "LINEAR": 3 * n, "ANGULAR": 3 * n,
         "LINEAR_ACCELERATION": 3 * n, "ANGULAR_ACCELERATION": 3 * n, "REACTION_FORCE": 3 * n,
         "REACTION_TORQUE": 3 * n, "CLOSURE_FORCE": 3 * closures, "CLOSURE_TORQUE": 3 * closures,
-        "KINETIC_ENERGY": 1, "POTENTIAL_ENERGY": 1,
+        "EVENT_TIME": events, "EVENT_INDICATOR": events, "KINETIC_ENERGY": 1, "POTENTIAL_ENERGY": 1,
     }  # fmt: skip
     return known | calculated
 

@@ -118,7 +118,9 @@ def dynamics_part(scenario: Scenario, *, native_arrays: bool) -> Part:
     return Part(
         "dynamics", scenario, mechanism, None,
         variables if native_arrays else scalars(variables),
-        dynamics_sections(n, nq, nv, len(mechanism.closures), len(mechanism.forces)),
+        dynamics_sections(
+            n, nq, nv, len(mechanism.closures), len(mechanism.forces), len(mechanism.events)
+        ),
         (integers[0], integers[1]),
         {
             "n": n, "nq": nq, "nv": nv, "parent": tables.parent, "order": tables.order,
@@ -130,6 +132,10 @@ def dynamics_part(scenario: Scenario, *, native_arrays: bool) -> Part:
             "closure_length": tables.closure_length,
             "forces": len(mechanism.forces), "force_type": tables.force_type, "force_body": tables.force_body,
             "force_point": tables.force_point,
+            "events": len(mechanism.events),
+            "event_joint": tables.event_joint, "event_action": tables.event_action,
+            "event_occasion": tables.event_occasion, "event_side": tables.event_side,
+            "event_threshold": tables.event_threshold, "event_restitution": tables.event_restitution,
         },
     )  # fmt: skip
 

@@ -42,6 +42,8 @@ def _unit(name: str, display: str = "", **exponents: int) -> Unit:
     return Unit(name, tuple(exponents.items()), display, DEGREES if display else 1.0)
 
 
+COORDINATE = Quantity("Coordinate")
+TIME_OF_EVENT = Quantity("EventTime", _unit("s", s=1))
 ANGLE = Quantity("Angle", _unit("rad", "deg", rad=1))
 ANGULAR_VELOCITY = Quantity("AngularVelocity", _unit("rad/s", "deg/s", rad=1, s=-1))
 ANGULAR_ACCELERATION = Quantity("AngularAcceleration", _unit("rad/s2", "deg/s2", rad=1, s=-2))

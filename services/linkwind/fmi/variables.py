@@ -37,6 +37,12 @@ Planar and free joints have coordinates of two kinds: ``q_translation`` and ``q_
 ``stiffness_…``, ``damping_…``, ``rest_…``. The joint that carries a body without a joint of its own is called
 ``world_link1``; it has coordinates only. A joint that is named like a body gets ``_joint`` at its end.
 
+A joint that closes a loop has ``.F`` and ``.T`` alone. One that may be released has room for the coordinates
+of a free joint, ``q`` of 7 and ``v`` of 6 elements: its own come first until it is released, then position
+and unit quaternion. An event ``separation`` has ``separation.time``, when it happened [s] or -1, and in Model
+Exchange the event indicator ``separation.indicator``; the stops of a joint are ``hinge.low`` and
+``hinge.high``.
+
 Further names: ``time``, ``gravity``, ``kinetic_energy``, ``potential_energy``, ``solver.integrator``,
 ``solver.substeps``, ``solver.rtol``, ``solver.atol``; in the force FMU ``density`` and ``wind``.
 
@@ -55,7 +61,7 @@ from typing import Literal
 from linkwind.fmi.units import Quantity
 
 Causality = Literal["independent", "parameter", "input", "output", "local"]
-Variability = Literal["continuous", "fixed", "tunable"]
+Variability = Literal["continuous", "discrete", "fixed", "tunable"]
 Kind = Literal["dependent", "constant"]
 
 
