@@ -140,7 +140,7 @@ def print_summary(outcome: Outcome) -> None:
         "largest joint gap": "no joints" if gap is None else f"{gap:.2g} m",
         "largest aerodynamic force": f"{summary['force_max_N']:.4g} N",
         **{name: _happened(at) for name, at in summary["events"].items()},
-        "log": summary["log"],
+        "log": outcome.log_trouble or summary["log"],
         "report": outcome.report_trouble or summary["report"],
     }
     for name, value in rows.items():

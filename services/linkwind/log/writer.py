@@ -9,6 +9,7 @@ trajectory is full-precision float64, of which zstd saves a tenth and costs more
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from time import monotonic
@@ -28,6 +29,8 @@ from linkwind.log.scene import Scene
 from linkwind.log.sink import Sink
 from linkwind.log.versions import versions
 from linkwind.spatial import Motion, Wrench
+
+_log = logging.getLogger("linkwind")
 
 CHUNK_SIZE = 256 * 1024  # bytes; a chunk is what a damaged byte makes unreadable
 
@@ -65,9 +68,11 @@ class LogWriter:
         provider_bodies: Mapping[str, Sequence[str]],
         metadata: Mapping[str, str],
         flush_interval: float = 1.0,
+        required: bool = True,
     ) -> None:
         self.path = Path(path)
-        self._flush_interval = flush_interval
+        self._flush_interval, self._required = flush_interval, required
+        self.cut = ""
         self._open()
         self._write_head(run, scenario_json, body_names, provider_bodies, metadata)
         self._channels(provider_bodies)
@@ -214,11 +219,17 @@ class LogWriter:
         self._check()
 
     def _check(self) -> None:
-        if self._file.failure is not None:
+        if self._file.failure is None:
+            return
+        why = self._file.failure.strerror
+        reason = f"{self.path}: expected to write the log; got {why}. The file is cut there"
+        if self._required:
             raise LogError(
-                f"{self.path}: expected to write the log; got {self._file.failure.strerror}. The file is cut "
-                "there. Free space, or choose another --out, and run again."
+                f"{reason}. Free space, or choose another --out, and run again."
             ) from self._file.failure
+        if not self.cut:
+            self.cut = f"{reason}, about step {max(0, self._states - 1)}"
+            _log.warning("%s; the run goes on without (log.required = false)", self.cut)
 
     def close(self, *, final_state_sha256: str | None = None, error: BaseException | None = None) -> None:
         """Record how the run ended and finish the file; a second call does nothing.

@@ -25,12 +25,14 @@ class Kept(Generic[T]):
         log: the MCAP file.
         report: the HTML page.
         report_trouble: why there is no page; empty if there is one.
+        log_trouble: why the log ends before the job does; empty if it does not.
     """
 
     result: T
     log: Path
     report: Path
     report_trouble: str
+    log_trouble: str
 
 
 def keep(
@@ -55,7 +57,7 @@ def keep(
         if not log.exists():
             raise
         raise type(error)(f"{error}\nlog: {log}\nreport: {_report(log, report) or report}") from error
-    return Kept(result, log, report, _report(log, report))
+    return Kept(result, log, report, _report(log, report), writer.cut)
 
 
 def _report(log: Path, report: Path) -> str:

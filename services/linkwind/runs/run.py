@@ -37,6 +37,7 @@ class Outcome:
         log: the MCAP file.
         report: the HTML page.
         report_trouble: why there is no page; empty if there is one.
+        log_trouble: why the log ends before the run does; empty if it does not.
     """
 
     scenario: str
@@ -44,6 +45,7 @@ class Outcome:
     log: Path
     report: Path
     report_trouble: str = ""
+    log_trouble: str = ""
 
     def as_json(self) -> dict[str, Any]:
         """Return the outcome with the keys of ``linkwind run --json``."""
@@ -62,6 +64,7 @@ class Outcome:
             "events": result.events,
             "final_state_sha256": result.final_state_sha256,
             "log": str(self.log),
+            "log_trouble": self.log_trouble or None,
             "report": None if self.report_trouble else str(self.report),
         }
 
@@ -178,7 +181,9 @@ def drive(
         return result
 
     kept = keep(folder, link, lambda path: _new_log(path, service, beginning.metadata), job)
-    return Outcome(service.scenario.name, kept.result, kept.log, kept.report, kept.report_trouble)
+    return Outcome(
+        service.scenario.name, kept.result, kept.log, kept.report, kept.report_trouble, kept.log_trouble
+    )
 
 
 def _heard(
@@ -205,4 +210,5 @@ def _new_log(path: Path, service: DynamicsService, metadata: Mapping[str, str]) 
             "library_sha256": library_sha256(),
             **metadata,
         },
+        required=service.scenario.log.required,
     )

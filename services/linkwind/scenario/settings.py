@@ -122,6 +122,10 @@ class Logging(Section):
         ge=0,
         description="Steps from one checkpoint of the providers to the next, to resume from; 0: none",
     )
+    required: bool = Field(
+        default=True,
+        description="Whether a full disk, which ends the log, ends the run, too; false: it goes on",
+    )
 
 
 class Bus(Section):
