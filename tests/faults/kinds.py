@@ -1,0 +1,221 @@
+"""What can go wrong with a run, at a random moment each: how it ends, how soon, and what its log is worth."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+
+from linkwind.bus.zenoh import LEASE
+from linkwind.log.reader import open_log
+from linkwind.runs.verify import scenario_of, verify
+from tests.faults.malformed import fuzz
+from tests.faults.test_disk import on_a_full_disk
+from tests.faults.test_malformed import GROWTH
+from tests.faults.test_processes import Programs
+from tests.networks.namespaces import Machines
+from tests.security.attacks import hostile
+from tests.security.bed import Bed, attacker
+
+PATIENCE = 120.0  # s for a machine under load
+MESSAGES = 5000  # malformed ones in one trial
+
+
+@dataclass
+class Trial:
+    """How a fault ended.
+
+    Attributes:
+        within: s from the fault to its end, or to its recovery.
+        lost: s of the run that are not in its log; None where that is no question.
+    """
+
+    within: float
+    lost: float | None = None
+
+
+def ended(process: subprocess.Popen[str], code: int, *errors: str) -> float:
+    """Wait for a process to end as it should; return when that was."""
+    _, said = process.communicate(timeout=PATIENCE)
+    now = time.monotonic()
+    assert process.returncode == code, f"status {process.returncode}: {said}"
+    assert any(error in said for error in errors), said
+    assert "Traceback" not in said, said
+    return now
+
+
+def truthful(log: Path) -> None:
+    """Check that a log is not complete, says so, and that every bit that is there is right."""
+    assert not open_log(log).complete
+    assert verify(*scenario_of(log)).identical
+
+
+def hit(side: str, number: signal.Signals, folder: Path, chance: Random) -> Trial:
+    """Send a signal to one side of a run."""
+    programs = Programs(folder)
+    try:
+        sides = {"dynamics": programs.dynamics("coupling.timeout=60"), "aero": programs.aero()}
+        programs.await_steps()
+        time.sleep(chance.uniform(0.0, 1.0))
+        os.kill(sides[side].pid, number)
+        began, flushed = time.monotonic(), time.time()
+        if side == "aero":
+            within = ended(sides["dynamics"], 4, '"aero" was lost at step ') - began
+            truthful(programs.log())
+            return Trial(within, 0.0)
+        within = ended(sides["aero"], 4, "the dynamics was lost") - began
+        os.kill(sides["dynamics"].pid, signal.SIGKILL)
+        sides["dynamics"].wait()
+        lost = max(0.0, flushed - programs.log().stat().st_mtime)
+        truthful(programs.log())
+        return Trial(within, lost)
+    finally:
+        programs.end()
+
+
+def told(number: signal.Signals, folder: Path, chance: Random) -> Trial:
+    """Tell a run to stop."""
+    programs = Programs(folder)
+    try:
+        run = programs.start("run", "two_link", "--out", "out", "--set=time.end=1000")
+        programs.await_steps()
+        time.sleep(chance.uniform(0.0, 1.0))
+        children = Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text().split()
+        run.send_signal(number)
+        began = time.monotonic()
+        within = ended(run, 130, "stopped at step ") - began
+        assert not [child for child in children if Path(f"/proc/{child}").exists()]
+        truthful(programs.log())
+        return Trial(within, 0.0)
+    finally:
+        programs.end()
+
+
+def cut(folder: Path, chance: Random) -> Trial:
+    """Pull the cable between two machines for 0.1 to 10 s."""
+    machines, log = Machines(folder), folder / "out" / "log.mcap"
+    try:
+        machines.add("d", "a")
+        here, _ = machines.connect("d", "a")
+        aero = machines.start("a", "aero", "--connect", f"tcp/{here}:7447")
+        options = ["--out", "out", "--json", "--set=time.end=1000", "--set=coupling.timeout=60"]
+        dynamics = machines.start("d", "dynamics", "two_link", "--listen", "tcp/0.0.0.0:7447", *options)
+        grows(log)
+        machines.cable("d", 1, "down")
+        began, gone = time.monotonic(), 0.1 * 100.0 ** chance.random()
+        time.sleep(gone)
+        machines.cable("d", 1, "up")
+        if gone < 0.8 * LEASE:
+            grows(log)
+            within = time.monotonic() - began
+            dynamics.send_signal(signal.SIGINT)
+            ended(dynamics, 130, "stopped at step ")
+        else:
+            # Close to the lease, either side may have noticed first; or nobody, and the run goes on.
+            deadline = began + gone + 5.0 * LEASE
+            while dynamics.poll() is None and time.monotonic() < deadline:
+                time.sleep(0.05)
+            if dynamics.poll() is None and gone < 2.0 * LEASE:
+                grows(log)
+                dynamics.send_signal(signal.SIGINT)
+                ended(dynamics, 130, "stopped at step ")
+                within = gone
+            else:
+                within = ended(dynamics, 4, '"aero" was lost at step ', '"aero" stopped at step ') - began
+                ended(aero, 4, "the dynamics was lost", '"dynamics" stopped at step ')
+        truthful(log)
+        return Trial(max(0.0, within - gone), 0.0)
+    finally:
+        machines.end()
+
+
+def grows(log: Path) -> None:
+    """Wait until a log grows."""
+    deadline = time.monotonic() + PATIENCE
+    goal = 100_000 + (log.stat().st_size if log.exists() else 0)
+    while not log.exists() or log.stat().st_size < goal:
+        assert time.monotonic() < deadline, "the run does not go on"
+        time.sleep(0.01)
+
+
+def twice(folder: Path, chance: Random) -> Trial:
+    """Start the aero side late, then once more."""
+    programs = Programs(folder)
+    try:
+        dynamics = programs.dynamics()
+        time.sleep(chance.uniform(0.0, 2.0))
+        programs.aero()
+        programs.await_steps()
+        began = time.monotonic()
+        again = programs.aero()
+        within = ended(again, 4, "already takes part in run") - began
+        programs.forget_last()
+        programs.await_steps()
+        dynamics.send_signal(signal.SIGINT)
+        ended(dynamics, 130, "stopped at step ")
+        truthful(programs.log())
+        return Trial(within, 0.0)
+    finally:
+        programs.end()
+
+
+def struck(folder: Path, chance: Random) -> Trial:
+    """Publish a hostile message into a run that trusts its network."""
+    key, payload = chance.choice([item for item in hostile().items() if item[0] != "motion"])
+    with Bed(folder, secure=False) as bed, closing(attacker(bed.by_router, None)) as session:
+        while not any(True for _ in session.info.routers_zid()):
+            time.sleep(0.01)
+        time.sleep(0.2)
+        began = time.monotonic()
+        while bed.alive() and time.monotonic() < began + 10.0:
+            session.put(f"linkwind/v1/attacked/{key}", payload)
+            time.sleep(0.05)
+        within = time.monotonic() - began
+        said = bed.stop()
+        assert re.search(
+            r"error: (wrench|frame|checkpoint) from|error: \"aero\" (stopped|was lost) at", said
+        ), said
+    truthful(bed.log)
+    return Trial(within, 0.0)
+
+
+def malformed(folder: Path, chance: Random) -> Trial:
+    """Give both ends 5,000 malformed messages; none may be an unnamed error, leave a trace, or memory."""
+    began = time.monotonic()
+    done = fuzz(MESSAGES, chance.randrange(2**31))
+    assert not done.unexpected, done.unexpected
+    assert done.grown < GROWTH, done.grown
+    return Trial((time.monotonic() - began) / MESSAGES)
+
+
+def full(folder: Path, chance: Random) -> Trial:
+    """Let the disk be full in the middle of a run."""
+    began = time.monotonic()
+    done = on_a_full_disk(folder)
+    assert done.returncode == 3
+    assert "expected to write the log; got File too large. The file is cut there." in done.stderr
+    truthful(folder / "out" / "log.mcap")
+    return Trial(time.monotonic() - began)
+
+
+Kind = Callable[[Path, Random], Trial]
+KINDS: dict[str, Kind] = {
+    f"{side} {name}": lambda folder, chance, side=side, number=number: hit(side, number, folder, chance)
+    for side in ("aero", "dynamics")
+    for name, number in (("killed", signal.SIGKILL), ("stopped", signal.SIGSTOP))
+} | {
+    "Ctrl-C": lambda folder, chance: told(signal.SIGINT, folder, chance),
+    "SIGTERM": lambda folder, chance: told(signal.SIGTERM, folder, chance),
+    "network cut, 0.1 to 10 s": cut,
+    "late, then twice": twice,
+    "hostile message, no TLS": struck,
+    "5,000 malformed messages": malformed,
+    "disk full": full,
+}  # fmt: skip
