@@ -10,6 +10,7 @@ from linkwind.cli import (
     certs,
     doctor,
     fmu,
+    happen,
     logs,
     mechanism,
     record,
@@ -51,6 +52,7 @@ validate.register(app)
 certs.register(app)
 doctor.register(app)
 router.register(app)
+happen.register(app)
 
 
 @app.callback(invoke_without_command=True)

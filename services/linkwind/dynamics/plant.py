@@ -11,7 +11,7 @@ from linkwind.coupling import Met
 from linkwind.dynamics.methods import multibody
 from linkwind.errors import SimulationError
 from linkwind.mechanism import Mechanism
-from linkwind.native.multibody import Integrator
+from linkwind.native.multibody import NOT_YET, ORDERED, Integrator
 from linkwind.scenario import Scenario
 from linkwind.spatial import Array, Motion
 
@@ -43,6 +43,23 @@ class MechanismPlant:
         self.change(mechanism, scenario)
         self.initial = State(0, self.multibody.initial_state(mechanism.q0, mechanism.v0), 0.0, 0.0)
         self._motion = Motion.at_rest(self.multibody.n)
+        self._orders: dict[int, int] = {}
+
+    def order(self, event: int, step: int) -> None:
+        """Let an event, by its number, happen at the start behind communication point ``step``."""
+        self._orders.setdefault(event, step)
+
+    def _begin(self, state: State) -> Array:
+        """Return the values to advance from: those of the state, with what is ordered for it."""
+        due = [event for event, step in self._orders.items() if step == state.step]
+        if not due:
+            return state.values
+        values = state.values.copy()
+        times = values[len(values) - self.multibody.events :]
+        for event in due:
+            if times[event] == NOT_YET:
+                times[event] = ORDERED
+        return values
 
     def change(self, mechanism: Mechanism, scenario: Scenario) -> None:
         """Go on under the settings of another scenario with the same bodies, joints and steps."""
@@ -59,7 +76,7 @@ class MechanismPlant:
         """Return the state one macro step later; see :class:`linkwind.coupling.Plant`."""
         try:
             values, work = self.multibody.advance(
-                state.values,
+                self._begin(state),
                 self._step,
                 nodes,
                 wrenches,
@@ -83,7 +100,7 @@ class MechanismPlant:
         """Advance under an affine wrench; see :class:`linkwind.coupling.Plant`."""
         try:
             values, work, affine = self.multibody.advance_affine(
-                state.values,
+                self._begin(state),
                 self._step,
                 nodes,
                 wrenches,

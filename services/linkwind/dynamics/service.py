@@ -65,6 +65,7 @@ class DynamicsService:
         mechanism: Mechanism,
         run: str,
         changes: Mapping[int, Scenario] = MappingProxyType({}),
+        orders: Mapping[str, int] = MappingProxyType({}),
     ) -> None:
         """Build the mechanism and the protocol's state; nothing is sent yet.
 
@@ -73,6 +74,7 @@ class DynamicsService:
             mechanism: of the scenario.
             run: id of the run.
             changes: scenarios that count after the communication point of a step, by step.
+            orders: events that were commanded, and the communication points after which they happened.
         """
         self._changes = {step: (changed, build(changed)) for step, changed in sorted(changes.items())}
         self._steps = [scenario, *(changed for changed, _ in self._changes.values())][-1].steps
@@ -91,6 +93,8 @@ class DynamicsService:
         self.mechanism = mechanism
         self._plant = MechanismPlant(mechanism, scenario, self.session.where)
         self.multibody = self._plant.multibody
+        self.session.commands = scenario.commands
+        self._order(orders)
         self._pending: deque[CommunicationPoint] = deque()
         self._times = ExchangeTimes()
         self._exchanged = 0
@@ -167,9 +171,15 @@ class DynamicsService:
             state = point.state
             if point.step % stride == 0:
                 progress(point.step)
+            while self.session.ordered:
+                self._order({self.session.ordered.pop(0): self.session.motion.at[0]})
             if point.step in self._changes:
                 self._change(point.step, *self._changes[point.step])
         return state
+
+    def _order(self, orders: Mapping[str, int]) -> None:
+        for event, step in orders.items():
+            self._plant.order(self.mechanism.events.index(event), step)
 
     def _change(self, step: int, scenario: Scenario, mechanism: Mechanism) -> None:
         """Go on under other settings after a communication point that is final."""

@@ -68,6 +68,8 @@ class HandShake:
         participants: the providers of the scenario, by name, in its order.
         course: what providers are told besides the scenario; set before anybody asks.
         failure: an error that ends the run, once there is one.
+        commands: events that wait for a command; set before anybody asks.
+        ordered: those that were commanded, until somebody takes them.
     """
 
     def __init__(
@@ -94,6 +96,8 @@ class HandShake:
         self.step_ns = step_ns
         self.course = Course()
         self.failure: LinkwindError | None = None
+        self.commands: tuple[str, ...] = ()
+        self.ordered: list[str] = []
         self._scenario_json = scenario_json
         self._steps = steps
         index = {name: i for i, name in enumerate(bodies)}
@@ -110,7 +114,7 @@ class HandShake:
                 the transport knows who asks.
         """
         try:
-            message = parse(request, "hello", "ready", "bye", "fault")
+            message = parse(request, "hello", "ready", "bye", "fault", "order")
             self._check_asker(message, asker)
             reply = getattr(self, "_on_" + message.WhichOneof("body"))(message)
         except ParticipantError as error:
@@ -125,6 +129,8 @@ class HandShake:
     @staticmethod
     def _check_asker(message: Any, asker: str | None) -> None:
         body = getattr(message, message.WhichOneof("body"))
+        if message.HasField("order"):
+            return  # whoever may use that key
         name = body.participant if message.WhichOneof("body") == "fault" else body.name
         if asker not in (None, name):
             raise RefusedError(f'control: expected a message of "{asker}", by its key; got one of "{name}"')
@@ -200,6 +206,14 @@ class HandShake:
             self.participants[message.bye.name].shown = message.bye.frames
             self.participants[message.bye.name].saved = message.bye.checkpoints
             self.participants[message.bye.name].answered = True
+        return Control(start={})
+
+    def _on_order(self, message: Any) -> Any:
+        event = message.order.event
+        if event not in self.commands:
+            names = ", ".join(self.commands) or "none"
+            raise RefusedError(f'event "{event}": expected one that waits for a command: {names}')
+        self.ordered.append(event)
         return Control(start={})
 
     def _on_fault(self, message: Any) -> Any:

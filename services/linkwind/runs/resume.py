@@ -29,6 +29,7 @@ from linkwind.runs.comparison import Comparison, finder
 from linkwind.runs.record import Record, checkpoint_steps, last_step, states_at
 from linkwind.runs.run import Beginning, Outcome, Progress, with_providers
 from linkwind.runs.splice import ContinuedLog, SplicedLink
+from linkwind.runs.verify import orders_of
 from linkwind.scenario import Scenario, from_json
 
 
@@ -150,7 +151,8 @@ def resume(
     for each in (scenario, *found.changes.values()):
         aero.check(each)
     states = states_at(log, found.start, step_ns) if found.start >= 0 else {}
-    service = DynamicsService(scenario, mechanism, log.run, found.changes)
+    before = {name: step for name, step in orders_of(log, scenario).items() if step < found.last}
+    service = DynamicsService(scenario, mechanism, log.run, found.changes, before)
     service.live_from = found.last + 1
     session = service.session
     session.course = dataclasses.replace(session.course, start=found.start, states=states)

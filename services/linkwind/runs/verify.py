@@ -17,7 +17,7 @@ from linkwind.bus.base import DynamicsLink
 from linkwind.dynamics.recorder import Recorder, tables_sha256
 from linkwind.dynamics.service import DynamicsService
 from linkwind.errors import InputError, LinkwindError, LogError
-from linkwind.log.contents import DYNAMICS, SUBSTITUTED
+from linkwind.log.contents import DYNAMICS, STATE, SUBSTITUTED
 from linkwind.log.difference import Difference
 from linkwind.log.reader import Log, open_log
 from linkwind.log.versions import versions
@@ -110,6 +110,16 @@ def changes_of(log: Log) -> dict[int, Scenario]:
     return {step: from_json(text) for step, text in log.changes.items()}
 
 
+def orders_of(log: Log, scenario: Scenario) -> dict[str, int]:
+    """Return the events that were commanded, each with the communication point after which it happened."""
+    if not scenario.commands or not log.topics.get(STATE):
+        return {}
+    times = log.columns(STATE)["event_time"][-1]
+    step = scenario.coupling.step_ns / 1e9
+    happened = {event.name: at for event, at in zip(scenario.events, times.tolist(), strict=False)}
+    return {name: int(happened[name] / step + 1e-6) for name in scenario.commands if happened[name] >= 0.0}
+
+
 def _again(
     log: Log,
     scenario: Scenario,
@@ -131,7 +141,7 @@ def _again(
     """
     live = log.metadata.get(SUBSTITUTED, DYNAMICS)
     if live == DYNAMICS:
-        service = DynamicsService(scenario, mechanism, log.run, changes_of(log))
+        service = DynamicsService(scenario, mechanism, log.run, changes_of(log), orders_of(log, scenario))
         session = service.session
         recorder = Recorder(comparison, scenario, mechanism, service.multibody)
         link = RecordedWrenches(session, log) if recorded else inprocess_link(session, files)

@@ -92,6 +92,11 @@ class Scenario(Section):
         return self.end_ns // self.coupling.step_ns
 
     @property
+    def commands(self) -> tuple[str, ...]:
+        """Names of the events that wait for a command."""
+        return tuple(event.name for event in self.events if event.at is None and event.when is None)
+
+    @property
     def planar(self) -> bool:
         """Whether the mechanism moves in the x, y plane: every inertia is a single number."""
         return all(body.planar for body in self.bodies)

@@ -7,6 +7,7 @@ who is there. Multicast, gossip and shared memory are off: endpoints are explici
 from linkwind.bus.zenoh.diagnosis import check_trust
 from linkwind.bus.zenoh.dynamics import SPIN, ZenohDynamicsLink
 from linkwind.bus.zenoh.listener import ZenohListener
+from linkwind.bus.zenoh.order import order
 from linkwind.bus.zenoh.player import ZenohPlayer
 from linkwind.bus.zenoh.provider import ZenohProviderLink
 from linkwind.bus.zenoh.router import ZenohRouter
@@ -24,4 +25,5 @@ __all__ = [
     "check_trust",
     "loopback_endpoint",
     "open_session",
+    "order",
 ]
