@@ -65,10 +65,6 @@ def test_an_order_counts_from_the_next_step_on_and_is_found_in_the_log(tmp_path:
             answers.append(parse(service.session.control(ordered("part"), "order"), "start", "refuse"))
 
     (tmp_path / "run").mkdir()
-    scenario_ = scenario.model_copy(
-        update={"bus": scenario.bus.model_copy(update={"transport": "inprocess"})}
-    )
-    service.scenario = scenario_
     outcome = with_providers(service, tmp_path / "run", progress, {})
     assert answers[0].HasField("start")
     at = outcome.result.events["part"]
