@@ -99,7 +99,7 @@ def test_frames_are_the_trajectory(run, page):
     np.testing.assert_allclose(unpack(scene["force"], 2, 3), path.wrench[:, :, :3], rtol=1e-7, atol=1e-12)
     assert scene["planar"]
     assert [body["name"] for body in scene["bodies"]] == ["link1", "link2"]
-    assert scene["joints"] == [{"name": "hinge", "body": 1, "point": [-0.25, 0.0, 0.0]}]
+    assert scene["joints"] == [{"name": "hinge", "body": 1, "point": [-0.25, 0.0, 0.0], "until": None}]
 
 
 def test_curves_are_the_trajectory(run, page):

@@ -102,6 +102,18 @@ class Run:
         return [joint for joint, free in self._joints if not free]
 
     @property
+    def released(self) -> dict[str, float]:
+        """When joints were released [s], by their names."""
+        times = self.trajectory.event_time
+        events = self.scenario.get("events", ())
+        last = times[-1].tolist() if len(times) else []
+        return {
+            event["joint"]: at
+            for event, at in zip(events, last, strict=False)
+            if event["action"] == "release" and at >= 0.0
+        }
+
+    @property
     def _joints(self) -> list[tuple[Mapping[str, Any], bool]]:
         joints = self.scenario.get("joints", ())
         return list(zip(joints, carries((j["type"], j["parent"], j["child"]) for j in joints), strict=True))

@@ -31,11 +31,7 @@ def scene(run: Run) -> dict[str, Any] | None:
         "orientation": pack(path.orientation[frames]),
         "force": pack(path.wrench[frames, :, :3]),
         "bodies": [_body(run, i) for i in range(len(run.bodies))],
-        "joints": [
-            {"name": joint["name"], "body": i, "point": joint["child_point"]}
-            for i, joint in enumerate(run.joint_of)
-            if joint is not None
-        ],
+        "joints": [_joint(run, joint) for joint in run.scenario.get("joints", ())],
         "planar": run.planar,
         "up": "z" if not run.planar and gravity[2] > gravity[1] else "y",
         "wind": environment["wind"],
@@ -53,6 +49,17 @@ def _body(run: Run, index: int) -> dict[str, Any]:
         "lines": [{"points": points.tolist(), "closed": closed} for points, closed in lines],
         "thick": not body.get("picture") and (body.get("shape") or {"type": "plate"})["type"] == "plate",
         "reach": float(np.linalg.norm(points[:, : 2 if run.planar else 3], axis=1).max()),
+    }
+
+
+def _joint(run: Run, joint: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a joint as a point of its child, and until when it is there [s]; None: to the end."""
+    until = run.released.get(joint["name"])
+    return {
+        "name": joint["name"],
+        "body": run.bodies.index(joint["child"]),
+        "point": joint["child_point"],
+        "until": until,
     }
 
 

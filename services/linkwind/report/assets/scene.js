@@ -125,8 +125,9 @@ export function makeScene(canvas, motion, clock) {
     pen.globalAlpha = 1;
   }
 
-  function joints(now) {
+  function joints(now, t) {
     for (const joint of scene.joints) {
+      if (joint.until != null && t > joint.until) continue; // released
       const pose = now[joint.body], [x, y] = camera.project(add(pose.at, turned(pose.q, joint.point)));
       pen.beginPath();
       pen.arc(x, y, 4.5, 0, 2 * Math.PI);
@@ -213,7 +214,7 @@ export function makeScene(canvas, motion, clock) {
     }
     bodies(now, 1, filmed);
     forces(now);
-    joints(now);
+    joints(now, t);
     key();
   }
 

@@ -79,7 +79,8 @@ export function makeSpace(host, motion, clock) {
   function frame(t) {
     const now = motion.poses(t), ranges = room(now), metres = ranges[0][1] - ranges[0][0];
     const { lines, heads } = arrows(now, metres);
-    const joints = scene.joints.map(({ body, point }) => add(now[body].at, turned(now[body].q, point)));
+    const held = scene.joints.filter(({ until }) => until == null || t <= until);
+    const joints = held.map(({ body, point }) => add(now[body].at, turned(now[body].q, point)));
     const path = motion.path.filter((_, i) => motion.times[i] <= t);
     return {
       ranges,
