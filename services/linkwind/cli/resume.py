@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from linkwind.cli.force_fmu import ForceFmuOption, files_by_provider, refuse_missing
-from linkwind.cli.options import JsonOption, LogArgument, OutOption, SetOption
+from linkwind.cli.options import JsonOption, LogArgument, OutOption, SetOption, TlsOption
 from linkwind.cli.run import behind_a_bar, print_summary
 
 
@@ -30,6 +30,7 @@ def resume(
     set_: SetOption = None,
     out: OutOption = None,
     force_fmu: ForceFmuOption = None,
+    tls: TlsOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Go on with a run that was cut, to the same end, bit for bit; or with other settings from a step on.
@@ -46,7 +47,7 @@ def resume(
     files = files_by_provider(found.scenario, force_fmu or [])
     refuse_missing(found.scenario, files)
     if as_json:
-        typer.echo(json.dumps(resume_run(found, out, files=files).as_json()))
+        typer.echo(json.dumps(resume_run(found, out, files=files, tls=tls).as_json()))
         return
     damage = found.log.damage
     if damage is not None:
@@ -54,6 +55,8 @@ def resume(
     begin = f"a checkpoint of step {found.start}" if found.start >= 0 else "the beginning"
     typer.echo(f"goes on after step {found.last} of {found.steps}; providers start from {begin}")
     outcome = behind_a_bar(
-        found.scenario.name, found.steps, lambda progress: resume_run(found, out, progress, files).outcome
+        found.scenario.name,
+        found.steps,
+        lambda progress: resume_run(found, out, progress, files, tls).outcome,
     )
     print_summary(outcome)

@@ -133,6 +133,7 @@ def resume(
     out: Path | None,
     progress: Progress = lambda step: None,
     files: Mapping[str, Path] = MappingProxyType({}),
+    tls: Path | None = None,
 ) -> Resumed:
     """Go on with a run, with every provider on this machine.
 
@@ -141,6 +142,7 @@ def resume(
         out: folder for the results; None for a new one under ``runs/``.
         progress: is told now and then how many steps are done, those from the log included.
         files: of the providers whose model is made from a file, by name.
+        tls: folder with a certificate for each participant; None without TLS.
 
     Raises:
         MismatchError: what was recorded does not come out again here.
@@ -167,7 +169,7 @@ def resume(
 
     beginning = Beginning(_metadata(found), link, new_log)
     folder = folders.create(scenario.name, out)
-    return Resumed(with_providers(service, folder, progress, files, beginning), found)
+    return Resumed(with_providers(service, folder, progress, files, beginning, tls), found)
 
 
 def _metadata(found: Plan) -> dict[str, str]:

@@ -1,0 +1,75 @@
+"""A long run with flat memory, files and threads on both sides: ``python -m tests.faults.soak [SECONDS]``."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from linkwind.log.reader import open_log
+from tests.faults.test_processes import Programs
+
+STEPS = 1_000_000
+WARM = 0.2  # share of the time after which nothing may grow
+POOL = 2  # threads that zenoh may have more or less of at a time
+INDEX = 10  # bytes that the log's index holds in memory for each step of the dynamics
+
+
+@dataclass
+class Use:
+    """What a process holds."""
+
+    memory: int  # bytes, resident
+    files: int
+    threads: int
+
+
+def use(pid: int) -> Use:
+    """Look at a process."""
+    memory = int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    return Use(memory, len(os.listdir(f"/proc/{pid}/fd")), len(os.listdir(f"/proc/{pid}/task")))
+
+
+def main(seconds: float) -> int:
+    """Run a million steps, or as many as there is time for; print what both sides held."""
+    with tempfile.TemporaryDirectory() as folder:
+        programs = Programs(Path(folder))
+        try:
+            dynamics = programs.dynamics(f"time.end={STEPS // 1000}")
+            sides = {"dynamics": dynamics, "aero": programs.aero()}
+            programs.await_steps()
+            began, before, after = time.monotonic(), {}, {}
+            while dynamics.poll() is None and (passed := time.monotonic() - began) < seconds:
+                if passed > WARM * seconds and not before:
+                    before = {name: use(process.pid) for name, process in sides.items()}
+                    size = programs.log().stat().st_size
+                if before and sides["aero"].poll() is None:
+                    after = {name: use(process.pid) for name, process in sides.items()}
+                time.sleep(0.2)
+            grown = programs.log().stat().st_size - size
+            dynamics.send_signal(signal.SIGINT)
+            dynamics.communicate()
+            log = open_log(programs.log())
+            steps = log.steps * grown / programs.log().stat().st_size
+            print(f"{log.steps} steps; what was held after {WARM:.0%} of the time, and at the end")
+            flat = True
+            for name, start in before.items():
+                end = after[name]
+                more = end.memory - start.memory
+                allowed = 2e6 + (INDEX * steps if name == "dynamics" else 0.0)
+                good = more < allowed and end.files <= start.files and end.threads <= start.threads + POOL
+                flat = flat and good
+                memory = f"memory {start.memory / 1e6:.1f} → {end.memory / 1e6:.1f} MB"
+                files = f"files {start.files} → {end.files}, threads {start.threads} → {end.threads}"
+                print(f"{name:>9}  {memory}, {files}  {'flat' if good else 'GROWS'}")
+        finally:
+            programs.end()
+    return int(not flat)
+
+
+if __name__ == "__main__":
+    sys.exit(main(float(sys.argv[1]) if len(sys.argv) > 1 else 60.0))
