@@ -32,6 +32,8 @@ def served(path, console=None):
 
 def show(browser, url, *, ready=READY):
     """Open a page and wait until it shows something."""
+    browser.send("Page.navigate", url="about:blank")  # the page before it may miss its server
+    browser.until("location.href === 'about:blank'")
     browser.events.clear()
     browser.send("Page.navigate", url=url)
     browser.until(f"location.href === '{url}' && document.readyState === 'complete' && {ready}")

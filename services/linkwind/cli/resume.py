@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from linkwind.cli.force_fmu import ForceFmuOption, files_by_provider, refuse_missing
 from linkwind.cli.options import JsonOption, LogArgument, OutOption, SetOption, TlsOption
 from linkwind.cli.run import behind_a_bar, print_summary
+from linkwind.cli.view import LOCAL, HostOption, NoOpenOption, PortOption, ViewOption, watched
+
+if TYPE_CHECKING:
+    from linkwind.runs.resume import Plan
 
 
 def register(app: typer.Typer) -> None:
@@ -31,6 +35,10 @@ def resume(
     out: OutOption = None,
     force_fmu: ForceFmuOption = None,
     tls: TlsOption = None,
+    view: ViewOption = False,
+    host: HostOption = LOCAL,
+    port: PortOption = 0,
+    no_open: NoOpenOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Go on with a run that was cut, to the same end, bit for bit; or with other settings from a step on.
@@ -46,17 +54,24 @@ def resume(
     found = plan(open_log(log), from_step, set_ or [])
     files = files_by_provider(found.scenario, force_fmu or [])
     refuse_missing(found.scenario, files)
-    if as_json:
-        typer.echo(json.dumps(resume_run(found, out, files=files, tls=tls).as_json()))
-        return
+    with watched(view, host, port, no_open) as watch:
+        if as_json:
+            typer.echo(json.dumps(resume_run(found, out, files=files, tls=tls, watch=watch).as_json()))
+        else:
+            _tell(found)
+            print_summary(
+                behind_a_bar(
+                    found.scenario.name,
+                    found.steps,
+                    lambda progress: resume_run(found, out, progress, files, tls, watch).outcome,
+                )
+            )
+
+
+def _tell(found: Plan) -> None:
+    """Print where a run goes on."""
     damage = found.log.damage
     if damage is not None:
         typer.echo(f"note: the log is not complete: {damage.text}")
     begin = f"a checkpoint of step {found.start}" if found.start >= 0 else "the beginning"
     typer.echo(f"goes on after step {found.last} of {found.steps}; providers start from {begin}")
-    outcome = behind_a_bar(
-        found.scenario.name,
-        found.steps,
-        lambda progress: resume_run(found, out, progress, files, tls).outcome,
-    )
-    print_summary(outcome)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
@@ -20,6 +20,7 @@ from linkwind.cli.options import (
     TlsOption,
     default_endpoint,
 )
+from linkwind.cli.view import LOCAL, HostOption, NoOpenOption, PortOption, ViewOption, watched
 
 if TYPE_CHECKING:
     from linkwind.runs.run import Outcome, Progress
@@ -40,6 +41,10 @@ def run(
     set_: SetOption = None,
     force_fmu: ForceFmuOption = None,
     tls: TlsOption = None,
+    view: ViewOption = False,
+    host: HostOption = LOCAL,
+    port: PortOption = 0,
+    no_open: NoOpenOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Run a scenario: start every participant, exchange, log, report.
@@ -57,7 +62,10 @@ def run(
     else:
         loaded = load(scenario, set_ or [])
     refuse_missing(loaded, files)
-    _show(loaded, lambda progress: run_scenario(loaded, out, progress, files, tls), as_json=as_json)
+    with watched(view, host, port, no_open) as watch:
+        _show(
+            loaded, lambda progress: run_scenario(loaded, out, progress, files, tls, watch), as_json=as_json
+        )
 
 
 def dynamics(
@@ -68,6 +76,10 @@ def dynamics(
     connect: ConnectOption = None,
     tls: TlsOption = None,
     run_id: Annotated[str, typer.Option("--run", help="Id of the run; the folder's name if not given.")] = "",
+    view: ViewOption = False,
+    host: HostOption = LOCAL,
+    port: PortOption = 0,
+    no_open: NoOpenOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Start the dynamics alone; the providers connect from elsewhere.
@@ -87,13 +99,13 @@ def dynamics(
             where = (listen or connect or [""])[0].replace("0.0.0.0", "THIS-MACHINE")
             options = f"--connect {where} --name {provider.name}" + (" --tls DIR" if tls else "")
             typer.echo(f"waiting for {provider.name}: linkwind aero {options}")
-    _show(
-        loaded,
-        lambda progress: run_dynamics(
-            loaded, out, progress, run_id=run_id, listen=listen or [], connect=connect or [], identity=shown
-        ),
-        as_json=as_json,
-    )
+    ends: dict[str, Any] = {"listen": listen or [], "connect": connect or [], "identity": shown}
+    with watched(view, host, port, no_open) as watch:
+        _show(
+            loaded,
+            lambda progress: run_dynamics(loaded, out, progress, run_id=run_id, watch=watch, **ends),
+            as_json=as_json,
+        )
 
 
 def _show(scenario: Scenario, job: Callable[[Progress], Outcome], *, as_json: bool) -> None:

@@ -1,22 +1,34 @@
-"""``linkwind view``: a log, or a run that writes one, in the browser."""
+"""``linkwind view``: a log, or a run that writes one, in the browser; ``--view`` of the commands that run."""
 
 from __future__ import annotations
 
 import json
+import os
+import sys
+import threading
 import webbrowser
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 if TYPE_CHECKING:
+    from linkwind.runs.watch import Watch
     from linkwind.view.recording import Recording
 
+LOCAL = "127.0.0.1"
+
+ViewOption = Annotated[
+    bool, typer.Option("--view", help="Show the run in the browser while it goes on; hold it from there.")
+]
 HostOption = Annotated[
-    str, typer.Option("--host", help="Address to serve on; others than this machine's own see it.")
+    str,
+    typer.Option("--host", help="Address to serve the page on; 0.0.0.0 shows it to other machines."),
 ]
 PortOption = Annotated[
-    int, typer.Option("--port", min=0, max=65535, help="Port of the page; any free one if not given.")
+    int, typer.Option("--port", min=0, max=65535, help="Port of the page; any that is free if not given.")
 ]
 NoOpenOption = Annotated[bool, typer.Option("--no-open", help="Only print the address of the page.")]
 
@@ -28,9 +40,10 @@ def register(app: typer.Typer) -> None:
 
 def view(
     log: Annotated[
-        Path, typer.Argument(help="The MCAP log of a run, also one that is going on, or its folder.")
+        Path,
+        typer.Argument(help="The MCAP log of a run, also of one that goes on; its folder; or one of runs."),
     ],
-    host: HostOption = "127.0.0.1",
+    host: HostOption = LOCAL,
     port: PortOption = 0,
     no_open: NoOpenOption = False,
     foxglove_layout: Annotated[
@@ -53,14 +66,27 @@ def view(
         return
     place = listen(host, port)
     url = f"http://{host}:{place.getsockname()[1]}/"
-    console = Console(tell_parent) if steered else None
+    serving = server(
+        recording, Console(tell_parent) if steered else None, LOOPBACK if host in LOOPBACK else ["*"]
+    )
     if steered:
+        threading.Thread(target=_end_with_parent, args=(serving,), daemon=True).start()
         tell_parent({"url": url})
     else:
         typer.echo(f"{url}  (Ctrl-C ends)")
-    if not no_open:
-        webbrowser.open(url)
-    server(recording, console, LOOPBACK if host in LOOPBACK else ["*"]).run(sockets=[place])
+        _open(url, wanted=not no_open)
+    serving.run(sockets=[place])
+
+
+def _end_with_parent(serving: Any) -> None:
+    """End the server as soon as the run that started this process has closed the pipe, or is gone."""
+    sys.stdin.read()
+    serving.should_exit = True
+
+
+def _open(url: str, *, wanted: bool) -> None:
+    if wanted and (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        webbrowser.open(url)  # without a screen it would be one for the terminal
 
 
 def _write_layout(recording: Recording, file: Path) -> None:
@@ -74,3 +100,35 @@ def _write_layout(recording: Recording, file: Path) -> None:
             f"{file}: cannot write the layout: {error.strerror}. Choose another place"
         ) from error
     typer.echo(str(file))
+
+
+@contextmanager
+def watched(wanted: bool, host: str, port: int, no_open: bool) -> Iterator[Watch | None]:
+    """Provide what shows the run in the block, and keep the page until Ctrl-C when the run is over.
+
+    Raises:
+        typer.Exit: the run failed, which has been printed.
+    """
+    from linkwind.errors import LinkwindError, StoppedError
+    from linkwind.runs.watch import Watch
+
+    if not wanted:
+        yield None
+        return
+
+    def announce(url: str) -> None:
+        typer.echo(f"{url}  (stays after the run, until Ctrl-C)", err=True)
+        _open(url, wanted=not no_open)
+
+    watch = Watch(host, port, announce)
+    try:
+        yield watch
+        watch.stay()
+    except StoppedError:
+        raise
+    except LinkwindError as error:
+        print(f"error: {error}", file=sys.stderr)
+        watch.stay()
+        raise typer.Exit(error.exit_code) from error
+    finally:
+        watch.end()

@@ -57,6 +57,8 @@ class DynamicsService:
         session: the protocol's state.
         mechanism: of the scenario.
         live_from: the first step whose exchange is timed.
+        hold: is called before a step with its number, and may wait; what else it is given writes to the log
+            what has been accepted. None for nothing.
     """
 
     def __init__(
@@ -79,6 +81,7 @@ class DynamicsService:
         self._changes = {step: (changed, build(changed)) for step, changed in sorted(changes.items())}
         self._steps = [scenario, *(changed for changed, _ in self._changes.values())][-1].steps
         self.live_from = 0
+        self.hold: Callable[[int, Callable[[], None]], None] | None = None
         self.session = DynamicsSession(
             run=run,
             scenario_json=scenario.to_json(),
@@ -195,6 +198,8 @@ class DynamicsService:
 
     def _exchange(self, step: int, iteration: int, accepted: State, trial: State) -> Answer:
         """Post both states, write the log, return the sum of the providers' answers."""
+        if self.hold is not None and iteration == 0:
+            self.hold(step, self._write_pending)
         motion = self.session.motion
         self._plant.multibody.motion(accepted.values, motion.accepted)
         self._plant.multibody.motion(trial.values, motion.trial)

@@ -32,6 +32,7 @@ from linkwind.spatial import Motion, Wrench
 
 _log = logging.getLogger("linkwind")
 
+FLUSH_INTERVAL = 1.0  # s
 CHUNK_SIZE = 256 * 1024  # bytes; a chunk is what a damaged byte makes unreadable
 
 
@@ -49,9 +50,11 @@ class LogWriter:
         body_names: bodies in the order of the messages.
         provider_bodies: bodies of each provider, in the order of its WrenchStep.
         metadata: what else belongs to the run, such as ``tables_sha256`` and ``library_sha256``.
-        flush_interval: wall-clock time [s] after which messages are in the file.
+        required: whether a log that cannot be written ends the run.
 
     Attributes:
+        path: the file.
+        flush_interval: wall-clock time [s] after which messages are in the file; may be changed at any time.
         records: metadata written so far, by name.
 
     Raises:
@@ -67,11 +70,11 @@ class LogWriter:
         body_names: Sequence[str],
         provider_bodies: Mapping[str, Sequence[str]],
         metadata: Mapping[str, str],
-        flush_interval: float = 1.0,
+        flush_interval: float = FLUSH_INTERVAL,
         required: bool = True,
     ) -> None:
         self.path = Path(path)
-        self._flush_interval, self._required = flush_interval, required
+        self.flush_interval, self._required = flush_interval, required
         self.cut = ""
         self._open()
         self._write_head(run, scenario_json, body_names, provider_bodies, metadata)
@@ -215,7 +218,7 @@ class LogWriter:
             LogError: a write failed now or before, for want of space say.
         """
         self._writer.flush()
-        self._due = monotonic() + self._flush_interval
+        self._due = monotonic() + self.flush_interval
         self._check()
 
     def _check(self) -> None:

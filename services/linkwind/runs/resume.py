@@ -30,6 +30,7 @@ from linkwind.runs.record import Record, checkpoint_steps, last_step, states_at
 from linkwind.runs.run import Beginning, Outcome, Progress, with_providers
 from linkwind.runs.splice import ContinuedLog, SplicedLink
 from linkwind.runs.verify import orders_of
+from linkwind.runs.watch import Watch
 from linkwind.scenario import Scenario, from_json
 
 
@@ -134,6 +135,7 @@ def resume(
     progress: Progress = lambda step: None,
     files: Mapping[str, Path] = MappingProxyType({}),
     tls: Path | None = None,
+    watch: Watch | None = None,
 ) -> Resumed:
     """Go on with a run, with every provider on this machine.
 
@@ -143,6 +145,7 @@ def resume(
         progress: is told now and then how many steps are done, those from the log included.
         files: of the providers whose model is made from a file, by name.
         tls: folder with a certificate for each participant; None without TLS.
+        watch: shows the run, and holds it; None for nobody.
 
     Raises:
         MismatchError: what was recorded does not come out again here.
@@ -169,7 +172,7 @@ def resume(
 
     beginning = Beginning(_metadata(found), link, new_log)
     folder = folders.create(scenario.name, out)
-    return Resumed(with_providers(service, folder, progress, files, beginning, tls), found)
+    return Resumed(with_providers(service, folder, progress, files, beginning, tls, watch), found)
 
 
 def _metadata(found: Plan) -> dict[str, str]:

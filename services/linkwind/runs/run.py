@@ -24,6 +24,7 @@ from linkwind.native.library import library_sha256
 from linkwind.runs import folder as folders
 from linkwind.runs.here import providers_here, zenoh_link
 from linkwind.runs.keeping import keep
+from linkwind.runs.watch import Watch
 from linkwind.scenario import Scenario
 
 
@@ -96,6 +97,7 @@ def run(
     progress: Progress,
     files: Mapping[str, Path] = MappingProxyType({}),
     tls: Path | None = None,
+    watch: Watch | None = None,
 ) -> Outcome:
     """Run ``scenario`` with every provider on this machine.
 
@@ -105,6 +107,7 @@ def run(
         progress: is told now and then how many steps are done.
         files: of the providers whose model is made from a file, by name.
         tls: folder with a certificate for each participant; None without TLS.
+        watch: shows the run, and holds it; None for nobody.
 
     Raises:
         LinkwindError: the run ended early; its log and report tell as well.
@@ -114,7 +117,7 @@ def run(
     aero.check(scenario)
     folder = folders.create(scenario.name, out)
     service = DynamicsService(scenario, mechanism, folders.run_id(folder))
-    return with_providers(service, folder, progress, files, tls=tls)
+    return with_providers(service, folder, progress, files, tls=tls, watch=watch)
 
 
 def with_providers(
@@ -124,10 +127,11 @@ def with_providers(
     files: Mapping[str, Path],
     beginning: Beginning = NEW,
     tls: Path | None = None,
+    watch: Watch | None = None,
 ) -> Outcome:
     """Run a service with every provider on this machine; see :func:`run`."""
     with providers_here(service.session, service.scenario, folder, files, tls) as (link, poll):
-        return drive(service, folder, progress, link, poll, beginning)
+        return drive(service, folder, progress, link, poll, beginning, watch)
 
 
 def dynamics(
@@ -139,6 +143,7 @@ def dynamics(
     listen: Sequence[str],
     connect: Sequence[str],
     identity: Identity | None = None,
+    watch: Watch | None = None,
 ) -> Outcome:
     """Run the dynamics alone; the providers come from elsewhere. See :func:`run`.
 
@@ -160,7 +165,7 @@ def dynamics(
     except InputError:
         folder.rmdir()
         raise
-    return drive(service, folder, progress, link)
+    return drive(service, folder, progress, link, watch=watch)
 
 
 def drive(
@@ -170,10 +175,14 @@ def drive(
     link: DynamicsLink,
     poll: Callable[[], None] = lambda: None,
     beginning: Beginning = NEW,
+    watch: Watch | None = None,
 ) -> Outcome:
     """Run the service over an open end of the bus, close that, and keep the log; see :func:`run`."""
 
     def job(writer: LogWriter) -> Result:
+        if watch is not None:
+            watch.begin(writer)
+            service.hold = _holding(watch, service, writer, poll)
         with _heard(beginning.log(writer), writer, link, service) as log:
             recorder = Recorder(log, service.scenario, service.mechanism, service.multibody)
             result = service.run(beginning.link(link), recorder, progress, poll)
@@ -196,6 +205,22 @@ def _heard(
     about = description(session.run, service.scenario.to_json(), writer.records)
     stream = link.listeners(topics(list(session.providers)), about)
     return nullcontext(log) if stream is None else PublishedLog(writer, stream, session.run)
+
+
+def _holding(
+    watch: Watch, service: DynamicsService, writer: LogWriter, poll: Callable[[], None]
+) -> Callable[[int, Callable[[], None]], None]:
+    """Return what lets a step of the service wait as long as those who watch it want."""
+    step_ns = service.scenario.coupling.step_ns
+
+    def hold(step: int, write_accepted: Callable[[], None]) -> None:
+        def rest() -> None:
+            write_accepted()
+            writer.flush()
+
+        watch.hold(step * step_ns, rest, poll)
+
+    return hold
 
 
 def _new_log(path: Path, service: DynamicsService, metadata: Mapping[str, str]) -> LogWriter:

@@ -8,14 +8,15 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
+FASTEST = 1e9  # rate
 PATIENCE = 5.0  # s without any viewer after which a run is held no longer: a page that is loaded again
 
 
 class Console:
     """The state of a steered run as its viewers set it; may be used from several threads.
 
-    Each change is told at once, as an object with what changed: ``pause`` (true or false), ``step`` (steps to
-    let pass), ``rate`` (simulation time over wall-clock time, 0 for as fast as possible), ``viewers``.
+    Each change is told at once, as an object with what changed: ``viewers``, how many there are, or a field
+    of the message Playback (``schemas/linkwind/v1/observe.proto``): ``paused``, ``points``, ``rate``.
     """
 
     def __init__(self, tell: Callable[[dict[str, Any]], None]) -> None:
@@ -27,23 +28,25 @@ class Console:
         self.paused = False
         self.rate = 0.0
 
-    def steer(self, command: dict[str, Any]) -> None:
+    def steer(self, command: Any) -> None:
         """Do what a viewer wants.
 
         Raises:
             ValueError: it is no command.
         """
         match command:
-            case {"pause": bool(paused)}:
-                self.paused = paused
-            case {"step": int(count)} if not isinstance(count, bool) and count > 0:
-                self.paused = True
-            case {"rate": float(rate) | int(rate)} if not isinstance(rate, bool) and 0.0 <= rate < 1e9:
-                self.rate = float(rate)
+            case {"paused": bool(paused)}:
+                wish: dict[str, Any] = {"paused": paused}
+            case {"points": int(points)} if points > 0 and not isinstance(points, bool):
+                wish = {"points": points}
+            case {"rate": float(rate) | int(rate)} if 0.0 <= rate < FASTEST and not isinstance(rate, bool):
+                wish = {"rate": float(rate)}
             case _:
-                raise ValueError('expected {"pause": true|false}, {"step": count} or {"rate": rate}')
+                raise ValueError('expected {"paused": true or false}, {"points": number} or {"rate": number}')
         with self._lock:
-            self._tell(command)
+            self.paused = wish.get("paused", self.paused or "points" in wish)
+            self.rate = wish.get("rate", self.rate)
+            self._tell(wish)
 
     def come(self) -> None:
         """A viewer is there."""
@@ -68,7 +71,7 @@ class Console:
         with self._lock:
             if not self._viewers:
                 self.paused, self.rate = False, 0.0
-                self._tell({"pause": False})
+                self._tell({"paused": False})
                 self._tell({"rate": 0.0})
 
 

@@ -24,6 +24,7 @@ from linkwind.spatial import Array
 
 WHOLE = 20_000, 1e9  # states, and bytes of the log around them, up to which all are shown; else a sample
 SAMPLES = 1200  # states of that sample
+LOG = "log.mcap"
 TAIL = 60  # states that are told of a run between two looks at it
 
 
@@ -212,13 +213,18 @@ class Recording:
 
 
 def open_recording(path: Path) -> Recording:
-    """Open a log to be shown; a folder of a run stands for its log.
+    """Open a log to be shown; a folder stands for the log in it, a folder of runs for the newest one.
 
     Raises:
         LogError: it is missing, no log of linkwind, or damaged before its scenario.
     """
     if path.is_dir():
-        path = path / "log.mcap"
-        if not path.exists():
-            raise LogError(f"{path}: expected a log in the folder of a run; got none. Check the path.")
+        logs = [path / LOG] if (path / LOG).exists() else sorted(path.glob(f"*/{LOG}"), key=_written)
+        if not logs:
+            raise LogError(f"{path}: expected a {LOG}, or folders of runs; got none. Check the path.")
+        path = logs[-1]
     return Recording(path)
+
+
+def _written(path: Path) -> float:
+    return path.stat().st_mtime

@@ -50,7 +50,7 @@ export function makeClock(step) {
     grow(from, to, goesOn) {
       first = from;
       last = to;
-      if (live && !goesOn) { following = false; t = Math.min(t, last); }
+      if (live && !goesOn && following) { following = false; t = last; }
       live = goesOn;
       if (following) start();
       tell();

@@ -11,8 +11,8 @@ import { makePoses } from "./poses.js";
 import { makeSpace } from "./space.js";
 
 const AHEAD = 6; // pictures of the fluid that are loaded before they are due
-const REST = 4; // times as long as loading took that a growing recording is left alone
-const SHORTEST = 700; // ms, the same at least
+const REST = 2; // times as long as loading took that a growing recording is left alone
+const SHORTEST = 600; // ms, the same at least
 const DETAIL = 700; // states around the time that is looked at, where all of the recording has too many
 
 const element = (id) => document.getElementById(id);
@@ -33,7 +33,7 @@ const clock = makeClock(facts.step);
 let now = facts; // what the server told last
 let view = null; // of the recording, once it has a state: poses, scene, charts
 let film = null, frames = 0;
-const loaded = { last: null, every: 1, busy: false, again: 0 };
+const loaded = { last: null, every: 1, busy: false, again: 0, timer: 0 };
 
 const playbar = makePlaybar(clock, run, () => loaded.every);
 
@@ -53,11 +53,15 @@ function fail(error) {
   element("banner").textContent = String(error.message ?? error);
 }
 
-// The whole recording: every state, or a sample.
+// The whole recording: every state, or a sample. Now and then while it grows, at once when it stands still.
 async function load() {
+  clearTimeout(loaded.timer);
   if (loaded.busy || now.last === null || now.last === loaded.last) return;
-  const wait = loaded.again - performance.now();
-  if (wait > 0 && !now.ended) { loaded.busy = true; setTimeout(() => { loaded.busy = false; load().catch(fail); }, wait); return; }
+  const wait = now.ended || run.paused ? 0 : loaded.again - performance.now();
+  if (wait > 0) {
+    loaded.timer = setTimeout(() => load().catch(fail), wait);
+    return;
+  }
   loaded.busy = true;
   const began = performance.now(), { first, last } = now;
   try {

@@ -13,7 +13,7 @@ export function makePlaybar(clock, run, spacing) {
 
   const steers = () => run.steered && clock.live && clock.following;
   const send = (command) => {
-    Object.assign(run, command); // shown at once; the run's answer comes with the next event
+    Object.assign(run, "points" in command ? { paused: true } : command); // shown at once
     show();
     return fetch("steer", {
       method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(command),
@@ -21,13 +21,13 @@ export function makePlaybar(clock, run, spacing) {
   };
 
   function toggle() {
-    if (steers()) send({ pause: !run.paused, paused: !run.paused });
+    if (steers()) send({ paused: !run.paused });
     else if (clock.playing || clock.following) clock.pause();
     else clock.play();
   }
 
   function onward() {
-    if (steers()) send({ step: 1, paused: true });
+    if (steers()) send({ points: 1 });
     else clock.move(1);
   }
 
