@@ -58,12 +58,15 @@ def test_the_records_that_are_no_messages(logged):
 def test_a_file_without_a_summary_is_the_same_without_what_is_cut(logged, tmp_path):
     path, messages = logged
     data, cut = path.read_bytes(), tmp_path / "cut.mcap"
-    for size in (*range(len(data) // 10, len(data), len(data) // 10), len(data) - 1):
+    for size in (
+        *range(len(data) // 4, len(data) // 2, 97),
+        *range(len(data) // 2, len(data), len(data) // 9),
+    ):
         cut.write_bytes(data[:size])
         try:
             log = open_seekable(cut)
         except LogError:
-            assert size < len(data) // 4
+            assert size < len(data) // 3
             continue
         expected = [m.payload for m in open_log(cut).raw("/state")]
         assert log.between(("/state",), *EVER)["/state"] == expected

@@ -136,6 +136,19 @@ def messages_of(
     return found
 
 
+def places_of(records: bytes) -> dict[int, list[tuple[int, int]]]:
+    """Return time [ns] and place of the messages of a chunk by channel, as its index would."""
+    found: dict[int, list[tuple[int, int]]] = {}
+    at, end = 0, len(records)
+    while at < end:
+        opcode, length, channel = _RECORD.unpack_from(records, at)
+        if opcode == MESSAGE:
+            _, time_ns, _ = _MESSAGE.unpack_from(records, at + _HEAD.size)
+            found.setdefault(channel, []).append((time_ns, at))
+        at += _HEAD.size + length
+    return found
+
+
 def add_channel(
     opcode: int, content: bytes, schemas: dict[int, SchemaInfo], channels: dict[int, ChannelInfo]
 ) -> None:

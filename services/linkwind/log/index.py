@@ -28,6 +28,7 @@ from linkwind.log.chunks import (
     chunk_records,
     messages_of,
     parsed,
+    places_of,
     record_at,
 )
 from linkwind.log.scan import Contents, Gap, next_chunk, take_rare
@@ -39,13 +40,14 @@ _HEAD = struct.Struct("<BQ")  # opcode, length of the content
 _TIMES = struct.Struct("<QQ")  # first and last time of a chunk [ns], at the start of its content
 _CHUNK_INDEX = struct.Struct("<QQQQI")  # the times, place and length of the chunk; how many bytes of places
 _PLACE = struct.Struct("<HQ")  # a channel, and where its index of the chunk is
+UNWRITTEN = -1  # place of an index that is not in the file
 PEEK = _HEAD.size + _TIMES.size
 
 Times = NDArray[np.int64]
 
 
 class ChunkAt(NamedTuple):
-    """A chunk: first and last time [ns], where its content is, where the index of each channel is."""
+    """A chunk: first and last time [ns], its content, and where each channel's index is, or UNWRITTEN."""
 
     start_ns: int
     end_ns: int
@@ -98,10 +100,13 @@ class Index:
 
     def entries(self, chunk: ChunkAt, channel: int) -> Times:
         """Return times [ns] and places of a channel's messages in a chunk, shape (k, 2), in order of time."""
-        opcode, content = self._record(chunk.indexes[channel])
-        if opcode != Opcode.MESSAGE_INDEX or (len(content) - 6) % 16:
-            return np.empty((0, 2), np.int64)
-        entries = np.frombuffer(content, "<u8", offset=6).reshape(-1, 2).astype(np.int64)
+        if chunk.indexes[channel] == UNWRITTEN:
+            entries = np.array(places_of(self.records(chunk)).get(channel, []), np.int64).reshape(-1, 2)
+        else:
+            opcode, content = self._record(chunk.indexes[channel])
+            if opcode != Opcode.MESSAGE_INDEX or (len(content) - 6) % 16:
+                return np.empty((0, 2), np.int64)
+            entries = np.frombuffer(content, "<u8", offset=6).reshape(-1, 2).astype(np.int64)
         return entries[np.argsort(entries[:, 0], kind="stable")]
 
     def _read(self, at: int, size: int) -> bytes:
@@ -167,7 +172,20 @@ class Index:
                 self._at = start + length
             elif not self._skip_damage():
                 break
+        if self.chunks and not self.ended:
+            self._complete(self.chunks[-1])
         self.times = self._times()
+
+    def _complete(self, last: ChunkAt) -> None:
+        """Note channels of the last chunk whose index has not been written, or was cut off."""
+        for channel in places_of(self.records(last)):
+            last.indexes.setdefault(channel, UNWRITTEN)
+            self._name(channel, last)
+
+    def _name(self, channel: int, chunk: ChunkAt) -> None:
+        """Take in the channels that a chunk introduces, if a channel of it is not known."""
+        if channel not in self.channels:
+            messages_of(self.records(chunk), self.channels, ())
 
     def _take(self, opcode: int, span: Span, peek: bytes) -> None:
         if opcode == Opcode.CHUNK:
@@ -176,8 +194,7 @@ class Index:
         elif opcode == Opcode.MESSAGE_INDEX and self.chunks:
             channel = int.from_bytes(peek[_HEAD.size : _HEAD.size + 2], "little")
             self.chunks[-1].indexes[channel] = self._at
-            if channel not in self.channels:
-                messages_of(self.records(self.chunks[-1]), self.channels, ())
+            self._name(channel, self.chunks[-1])
         elif opcode == Opcode.DATA_END:
             self.ended = True
         elif not take_rare(opcode, self._read(span.start, span.end - span.start), self.contents):
