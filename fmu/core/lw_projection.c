@@ -2,8 +2,9 @@
 #include "lw_model.h"
 
 enum { LW_PROJECTIONS = 25 };
-static const double closed = 1e-14;   /* of the positions' size: round-off */
+static const double closed = 1e-14;   /* of the positions' or velocities' size: round-off */
 static const double accepted = 1e-10; /* of the same: where Newton's method may end */
+static const double fast = 1e-3;      /* by which a step closes a loop for whose next one its matrices will do */
 
 /* Largest violation, relative to the size of the positions, and the closure that has it. */
 static double violation(const lw_multibody *mb, int32_t *worst) {
@@ -23,11 +24,11 @@ static int prepare(lw_multibody *mb, const double *q, const double *v, lw_fault 
     return LW_OK;
 }
 
-/* Newton's method on q, along the forces of the closures. */
+/* Newton's method on q, along the forces of the closures; it leaves matrices from close by. */
 static int project_q(lw_multibody *mb, double *q, const double *v, lw_fault *fault) {
     double last = HUGE_VAL, *turn = mb->rate[1] + mb->nq, *rate = mb->rate[1];
+    int status = prepare(mb, q, v, fault);
     for (int k = 0; k < LW_PROJECTIONS; ++k) {
-        int status = prepare(mb, q, v, fault);
         if (status) return status;
         double now = violation(mb, &fault->item);
         int slow = !(now < 0.5 * last) && k > 5; /* far from closed, the first steps may overshoot */
@@ -43,20 +44,25 @@ static int project_q(lw_multibody *mb, double *q, const double *v, lw_fault *fau
         }
         lw_coordinate_normalise(mb, q);
         last = now;
+        lw_kinematics(mb, q, v);
+        lw_closure_equations(mb);
+        now = violation(mb, &fault->item);
+        if (now > closed && !(now < fast * last)) status = prepare(mb, q, v, fault);
     }
     return LW_OPEN;
 }
 
-/* v loses what the closures do not allow; the matrices are those of q. */
+/* v loses what the closures do not allow; the matrices are those of q, or from close by. */
 static void project_v(lw_multibody *mb, const double *q, double *v) {
-    double last = HUGE_VAL, *change = mb->rate[1] + mb->nq;
+    double last = HUGE_VAL, size = 1.0, *change = mb->rate[1] + mb->nq;
+    for (int i = 0; i < mb->n; ++i) size = fmax(size, lw_norm(mb->link[i].velocity.linear));
     for (int k = 0; k < 3; ++k) {
         double now = 0.0;
         for (int32_t r = 0; r < mb->rows; ++r) {
             mb->right[r] = -mb->row[r].rate;
             now = fmax(now, fabs(mb->right[r]));
         }
-        if (now == 0.0 || !(now < 0.5 * last)) return;
+        if (now <= closed * size || !(now < 0.5 * last)) return;
         lw_delassus_solve(mb);
         lw_delassus_respond(mb, change);
         for (int i = 0; i < mb->n; ++i)
