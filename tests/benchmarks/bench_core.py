@@ -103,7 +103,7 @@ def row(
     case: str, quantity: str, value: float, reference: float | None, target: float | None
 ) -> dict[str, Any]:
     ratio = None if reference is None else value / reference
-    ok = None if target is None or ratio is None else ratio <= target
+    ok = None if target is None or ratio is None else bool(ratio <= target)
     return {
         "case": case,
         "quantity": quantity,
