@@ -73,7 +73,7 @@ def build_data(root: Path) -> None:
     """Fill ``services/linkwind/_data`` with the library, the C sources and the schemas."""
     data = root / "services" / "linkwind" / "_data"
     data.mkdir(exist_ok=True)
-    for folder in ("core", "aero", "fmi", "host"):
+    for folder in ("core", "without", "aero", "fmi", "host"):
         shutil.rmtree(data / "fmu" / folder, ignore_errors=True)
         shutil.copytree(
             root / "fmu" / folder, data / "fmu" / folder, ignore=shutil.ignore_patterns("__pycache__")

@@ -17,6 +17,12 @@ from linkwind.fmi.toolchain import PLATFORMS
 DATA_FILE = "lw_fmu_data.c"
 HIDE = "-DLW_API="  # the library itself is not exported
 _AT_ONCE = 2  # compilers
+# Files of the core for what not every mechanism has; without it, one of `fmu/without` takes their place.
+_OPTIONAL = {
+    "closures": ("lw_closures.c", "lw_delassus.c", "lw_projection.c"),
+    "events": ("lw_events.c", "lw_impulse.c"),
+    "forces": ("lw_elements.c", "lw_expression.c", "lw_expression.h"),
+}
 
 
 def c_sources(part: Part, version: FmiVersion) -> dict[str, bytes]:
@@ -31,12 +37,17 @@ def c_sources(part: Part, version: FmiVersion) -> dict[str, bytes]:
         "lw_linear.c",
     }
     root = files("linkwind").joinpath("_data", "fmu")
+    absent = [what for what in _OPTIONAL if mechanism and not getattr(part.mechanism, what)]
+    left_out.update(name for what in absent for name in _OPTIONAL[what])
     shared = () if mechanism else ("lw_math.h", "lw_expression.h", "lw_expression.c")
     found = {name: root.joinpath("core", name).read_bytes() for name in shared}
     for folder in ("core" if mechanism else "aero", "fmi"):
         for file in root.joinpath(folder).iterdir():
             if file.name.endswith((".c", ".h")) and file.name not in left_out:
                 found[file.name] = file.read_bytes()
+    for what in absent:
+        name = f"lw_without_{what}.c"
+        found[name] = root.joinpath("without", name).read_bytes()
     return dict(sorted(found.items()))
 
 
