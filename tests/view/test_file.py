@@ -1,12 +1,17 @@
 """A log in the browser: played, stepped, searched, its flow and its space."""
 
 import json
+import os
 import subprocess
 import sys
 
 import pytest
 
+from linkwind.errors import FaultError, LogError
 from linkwind.log.reader import open_log
+from linkwind.scenario import load
+from linkwind.view import recording as recordings
+from tests.log.sample import new_writer
 
 from .pages import BADGE, PLAY, SCENE, T, scrub, served, show, troubles
 
@@ -103,6 +108,51 @@ def test_a_mechanism_in_space_is_orbited(browser, logs):
         browser.mouse("mouseMoved", 500, 430, 1)
         browser.mouse("mouseReleased", 500, 430)
         browser.until(f"{camera} !== '{before}'")
+        assert troubles(browser) == []
+
+
+def test_of_a_long_log_a_sample_is_shown_and_all_where_somebody_looks(browser, logs, monkeypatch):
+    monkeypatch.setattr(recordings, "WHOLE", (50, 1e9))
+    monkeypatch.setattr(recordings, "SAMPLES", 21)
+    points = "document.querySelector('.plot').data[0].x"
+    with served(logs["planar"]) as url:
+        show(browser, url)
+        browser.until(f"{points}.length < 25 && {points}.at(-1) === 0.3")
+        path = open_log(logs["planar"]).trajectory()
+        scrub(browser, 0.15)
+        for k in (151, 152):  # by one step, though the sample has every 15th
+            browser.key(".", ".")
+            browser.until(f"{T} === {k / 1000}")
+        zoom = "{'xaxis.range[0]': 0.15, 'xaxis.range[1]': 0.17}"  # as a drag over the plot ends
+        browser.evaluate(f"document.querySelector('.plot').emit('plotly_relayout', {zoom})")
+        browser.until(f"{points}.length === 21")
+        shown = browser.evaluate("Array.from(document.querySelector('.plot').data[0].y)")
+        assert shown == pytest.approx(path.linear[150:171, 0, 0].tolist(), rel=1e-5)
+        browser.evaluate("document.querySelector('.plot').dispatchEvent(new MouseEvent('dblclick'))")
+        browser.until(f"{points}.length < 25 && {points}.at(-1) === 0.3")
+        assert troubles(browser) == []
+
+
+def test_a_folder_of_runs_stands_for_its_newest_log(logs, tmp_path):
+    for age, name in ((100, "planar"), (0, "space"), (200, "cut")):
+        (tmp_path / name).mkdir()
+        copy = tmp_path / name / "log.mcap"
+        copy.write_bytes(logs[name].read_bytes())
+        os.utime(copy, times=(1e9 - age, 1e9 - age))
+    assert recordings.open_recording(tmp_path).facts["name"] == "spinner"
+    assert recordings.open_recording(tmp_path / "planar").facts["name"] == "two_link"
+    (tmp_path / "none").mkdir()
+    with pytest.raises(LogError, match="or folders of runs; got none"):
+        recordings.open_recording(tmp_path / "none")
+
+
+def test_a_run_that_died_before_its_first_state_says_so(browser, tmp_path):
+    with new_writer(tmp_path / "log.mcap", scenario_json=load("two_link").to_json()) as writer:
+        writer.close(error=FaultError("the provider is gone"))
+    with served(tmp_path / "log.mcap") as url:
+        show(browser, url, ready=f"{BADGE} === 'incomplete'")
+        assert "no state" in browser.evaluate("document.getElementById('waiting').textContent")
+        assert "the provider is gone" in browser.evaluate("document.getElementById('banner').textContent")
         assert troubles(browser) == []
 
 

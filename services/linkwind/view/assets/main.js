@@ -46,6 +46,7 @@ function tell() {
   element("banner").hidden = !error;
   element("banner").textContent = error ?? "";
   element("waiting").hidden = view !== null;
+  if (ended && now.last === null) element("waiting").textContent = "The log holds no state of the mechanism.";
 }
 
 function fail(error) {
