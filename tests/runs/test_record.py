@@ -66,13 +66,16 @@ def provide(endpoint: str) -> None:
         serve(link, session("aero"), PATIENCE)
 
 
-def fly(folder: Path, endpoint: str, *settings: str, name: str = "two_link", **parts: Any) -> Log:
+def fly(
+    folder: Path, endpoint: str, *settings: str, name: str = "two_link", listened: bool = False, **parts: Any
+) -> Log:
     """Run the dynamics here, its provider in a thread that starts once ``before`` has been called."""
     scenario = load(name, list(settings))
     before = parts.get("before", lambda: None)
     provider = Job(lambda: (before(), provide(endpoint)))
     try:
-        dynamics(scenario, folder, lambda step: None, run_id="r", listen=[endpoint], connect=[])
+        ends = {"listen": [endpoint], "connect": []}
+        dynamics(scenario, folder, lambda step: None, run_id="r", **ends, listened=listened)
     finally:
         provider.done()
     return open_log(folder / "log.mcap")
@@ -162,6 +165,24 @@ def test_who_comes_late_says_what_is_missing(tmp_path: Path) -> None:
     shown = CliRunner().invoke(app, ["log", "info", str(heard.path)]).stdout
     assert "heard on the bus by linkwind record" in shown
     assert recording.missed in shown
+
+
+def test_a_run_that_awaits_its_listener(tmp_path: Path) -> None:
+    """The provider is there at once, the recorder later; nothing is missed."""
+    endpoint = loopback_endpoint()
+    runner = Job(lambda: fly(tmp_path / "own", endpoint, "time.end=0.1", listened=True))
+    time.sleep(0.5)
+    recording = listening(endpoint, tmp_path / "heard").done()
+    own = runner.done()
+    assert (recording.missed, recording.error) == ("", "")
+    assert list(open_log(recording.log).raw()) == list(own.raw())
+    alone = loopback_endpoint()
+    settings = ["bus.start_timeout=0.3", "time.end=0.1"]
+    with pytest.raises(LostError, match=r"nobody listened within 0\.3 s \(bus\.start_timeout\)"):
+        dynamics(
+            load("two_link", settings), tmp_path / "alone", lambda step: None,
+            run_id="r", listen=[alone], connect=[], listened=True,
+        )  # fmt: skip
 
 
 def test_a_run_that_fails_is_recorded_to_its_end(tmp_path: Path) -> None:

@@ -21,12 +21,21 @@ class LogStream(Protocol):
         """Tell whether somebody listens to a topic."""
         ...
 
+    @property
+    def followed(self) -> bool:
+        """Whether every topic has a listener."""
+        ...
+
     def put(self, topic: str, number: int, time_ns: int, payload: bytes) -> None:
         """Send a message, the ``number``-th of its topic, at its simulation time [ns]."""
         ...
 
     def end(self, payload: bytes) -> None:
         """Send the last message: how the run ended."""
+        ...
+
+    def linger(self) -> None:
+        """Wait a moment for listeners that are behind; leaving the bus takes away what they do not have."""
         ...
 
 

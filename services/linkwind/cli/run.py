@@ -80,6 +80,9 @@ def dynamics(
     host: HostOption = LOCAL,
     port: PortOption = 0,
     no_open: NoOpenOption = False,
+    await_listener: Annotated[
+        bool, typer.Option("--await-listener", help="Begin when somebody listens (linkwind record).")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Start the dynamics alone; the providers connect from elsewhere.
@@ -100,6 +103,7 @@ def dynamics(
             options = f"--connect {where} --name {provider.name}" + (" --tls DIR" if tls else "")
             typer.echo(f"waiting for {provider.name}: linkwind aero {options}")
     ends: dict[str, Any] = {"listen": listen or [], "connect": connect or [], "identity": shown}
+    ends["listened"] = await_listener
     with watched(view, host, port, no_open) as watch:
         _show(
             loaded,

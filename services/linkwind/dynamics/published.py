@@ -76,3 +76,4 @@ class PublishedLog:
         self._log.close(error=error)
         later = {name: self._log.records[name] for name in (DIAGNOSTICS, END) if name in self._log.records}
         self._stream.end(ending(later, self._numbers))
+        self._stream.linger()

@@ -116,6 +116,7 @@ def _listen(
                 progress(heard.time_ns // scenario.coupling.step_ns)
         elif heard is not None:
             ending = ended(heard.payload)
+            listener.close()  # the run need not wait for us
             break
         elif not listener.gone:
             gone_at = float("inf")

@@ -16,7 +16,7 @@ from linkwind.dynamics import methods
 from linkwind.dynamics.published import PublishedLog, topics
 from linkwind.dynamics.recorder import MessageLog, Recorder, tables_sha256
 from linkwind.dynamics.service import DynamicsService, Result
-from linkwind.errors import InputError, ScenarioError
+from linkwind.errors import InputError, LostError, ScenarioError
 from linkwind.listening import description
 from linkwind.log.writer import LogWriter
 from linkwind.mechanism import build
@@ -144,10 +144,23 @@ def dynamics(
     connect: Sequence[str],
     identity: Identity | None = None,
     watch: Watch | None = None,
+    listened: bool = False,
 ) -> Outcome:
     """Run the dynamics alone; the providers come from elsewhere. See :func:`run`.
 
+    Args:
+        scenario: what to run.
+        out: folder for the results; None for a new one under ``runs/``.
+        progress: is told now and then how many steps are done.
+        run_id: id of the run; empty for the folder's name.
+        listen: zenoh endpoints to listen on.
+        connect: zenoh endpoints to connect to.
+        identity: the dynamics' certificate; None without TLS.
+        watch: who looks at the run while it goes on, if anybody.
+        listened: do not begin before somebody listens to all of the log.
+
     Raises:
+        LostError: nobody listens within bus.start_timeout.
         ScenarioError: the scenario wants everything in one process.
     """
     if scenario.bus.transport == "inprocess":
@@ -165,7 +178,7 @@ def dynamics(
     except InputError:
         folder.rmdir()
         raise
-    return drive(service, folder, progress, link, watch=watch)
+    return drive(service, folder, progress, link, watch=watch, listened=listened)
 
 
 def drive(
@@ -176,6 +189,8 @@ def drive(
     poll: Callable[[], None] = lambda: None,
     beginning: Beginning = NEW,
     watch: Watch | None = None,
+    *,
+    listened: bool = False,
 ) -> Outcome:
     """Run the service over an open end of the bus, close that, and keep the log; see :func:`run`."""
 
@@ -183,7 +198,7 @@ def drive(
         if watch is not None:
             watch.begin(writer)
             service.hold = _holding(watch, service, writer, poll)
-        with _heard(beginning.log(writer), writer, link, service) as log:
+        with _heard(beginning.log(writer), writer, link, service, listened=listened) as log:
             recorder = Recorder(log, service.scenario, service.mechanism, service.multibody)
             result = service.run(beginning.link(link), recorder, progress, poll)
             writer.close(final_state_sha256=result.final_state_sha256)
@@ -196,15 +211,26 @@ def drive(
 
 
 def _heard(
-    log: MessageLog, writer: LogWriter, link: DynamicsLink, service: DynamicsService
+    log: MessageLog, writer: LogWriter, link: DynamicsLink, service: DynamicsService, *, listened: bool
 ) -> AbstractContextManager[MessageLog]:
-    """Return a log that others on the bus can listen to, if it is one from the beginning."""
-    session = service.session
+    """Return a log that others on the bus can listen to, if it is one from the beginning.
+
+    Raises:
+        LostError: somebody must listen, and nobody does within bus.start_timeout.
+    """
+    session, timeout = service.session, service.scenario.bus.start_timeout
     if log is not writer:
         return nullcontext(log)
     about = description(session.run, service.scenario.to_json(), writer.records)
     stream = link.listeners(topics(list(session.providers)), about)
-    return nullcontext(log) if stream is None else PublishedLog(writer, stream, session.run)
+    if stream is None:
+        return nullcontext(log)
+    if listened and not link.wait(lambda: stream.followed, timeout, lambda: None):
+        raise LostError(
+            f"nobody listened within {timeout:g} s (bus.start_timeout). Start: linkwind record --connect "
+            "ENDPOINT, or leave --await-listener away"
+        )
+    return PublishedLog(writer, stream, session.run)
 
 
 def _holding(

@@ -111,4 +111,5 @@ class ZenohPlayer:
 
     def close(self) -> None:
         """Leave the bus, when everything published is on its way."""
+        self.log.linger()
         self._session.close()  # type: ignore[no-untyped-call]

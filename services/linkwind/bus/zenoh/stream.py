@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -11,6 +12,8 @@ from linkwind.bus.base import PREFIX
 from linkwind.listening import PLACE
 
 END = "/end"
+LINGER = 1.0  # s
+TICK = 2e-3  # s between two looks whether the listeners have gone
 
 
 class ZenohLogStream:
@@ -73,6 +76,11 @@ class ZenohLogStream:
         """Whether somebody listens to anything."""
         return any(self._wanted.values())
 
+    @property
+    def followed(self) -> bool:
+        """Whether every topic has a listener."""
+        return all(self._wanted.values())
+
     def put(self, topic: str, number: int, time_ns: int, payload: bytes) -> None:
         """Send a message, the ``number``-th of its topic, at its simulation time."""
         self._publishers[topic].put(payload, attachment=PLACE.pack(number, time_ns))
@@ -81,6 +89,12 @@ class ZenohLogStream:
         """Send the last message."""
         if self._wanted[END]:
             self._publishers[END].put(payload)
+
+    def linger(self) -> None:
+        """Stay a moment while there are listeners: a recorder leaves when it has everything."""
+        end = time.monotonic() + LINGER
+        while self._wanted[END] and time.monotonic() < end:
+            time.sleep(TICK)
 
 
 def matching(publisher: zenoh.Publisher) -> bool:
