@@ -38,6 +38,20 @@ def test_run_gives_the_same_bits_as_outside(project: Project, tmp_path: Path) ->
     assert not project.leftovers()
 
 
+def test_a_recorder_beside_the_run_has_all_of_it(project: Project) -> None:
+    status, output = project.do(
+        "--profile", "observe", "up", "--exit-code-from", "dynamics", OBSERVED="1", END="0.5"
+    )  # fmt: skip
+    assert status == 0, output
+    own, heard = (
+        open_log(next(project.folders["runs"].glob(pattern)) / "log.mcap")
+        for pattern in ("two_link-2*", "two_link-heard-*")
+    )
+    assert heard.complete
+    assert list(heard.raw()) == list(own.raw())
+    assert (heard.metadata, heard.versions) == (own.metadata, own.versions)
+
+
 def test_environment_says_what_to_run(project: Project, tmp_path: Path) -> None:
     linkwind("init", str(project.folders["scenarios"] / "my.toml"))
     settings = [
