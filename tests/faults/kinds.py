@@ -149,12 +149,13 @@ def twice(folder: Path, chance: Random) -> Trial:
     """Start the aero side late, then once more."""
     programs = Programs(folder)
     try:
-        dynamics = programs.dynamics()
+        dynamics = programs.dynamics("coupling.timeout=60")
         time.sleep(chance.uniform(0.0, 2.0))
         programs.aero()
         programs.await_steps()
         began = time.monotonic()
         again = programs.aero()
+        assert dynamics.poll() is None, dynamics.communicate()
         within = ended(again, 4, "already takes part in run") - began
         programs.forget_last()
         programs.await_steps()
