@@ -2,7 +2,8 @@
 #include "lw_model.h"
 
 enum { LW_PROJECTIONS = 25 };
-static const double closed = 1e-14;   /* of the positions' or velocities' size: round-off */
+static const double closed = 1e-14;   /* of the positions' size: round-off */
+static const double allowed = 1e-15;  /* of the velocities' size, which the first step leaves */
 static const double accepted = 1e-10; /* of the same: where Newton's method may end */
 static const double fast = 1e-3;      /* by which a step closes a loop for whose next one its matrices will do */
 
@@ -62,7 +63,7 @@ static void project_v(lw_multibody *mb, const double *q, double *v) {
             mb->right[r] = -mb->row[r].rate;
             now = fmax(now, fabs(mb->right[r]));
         }
-        if (now <= closed * size || !(now < 0.5 * last)) return;
+        if (now == 0.0 || (k > 0 && now <= allowed * size) || !(now < 0.5 * last)) return;
         lw_delassus_solve(mb);
         lw_delassus_respond(mb, change);
         for (int i = 0; i < mb->n; ++i)

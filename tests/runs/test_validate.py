@@ -32,6 +32,7 @@ def test_rows_judge_and_are_plain(tmp_path):
     assert "1.02" in text
     assert "off" in text
     assert "a remark" in text
+    assert "3 ok, 2 off" in text
 
 
 @pytest.mark.parametrize("m", [0.0, 0.3, 0.99])

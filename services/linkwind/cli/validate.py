@@ -56,6 +56,8 @@ def multibody(
 ) -> None:
     """Compare the multibody dynamics with published and exact values; exit code 5 if one is off.
 
+    All of it takes a minute on one core.
+
     Example: linkwind validate multibody --out validation
     """
     from linkwind.runs.validate import MULTIBODY
@@ -108,9 +110,9 @@ def _show(title: str, rows: list[Row]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from linkwind.runs.validate.page import HEADINGS, NUMBERS, cells
+    from linkwind.runs.validate.page import HEADINGS, NUMBERS, cells, summary
 
-    table = Table(title=title)
+    table = Table(title=title, caption=summary(rows))
     for heading in HEADINGS:
         right = heading in NUMBERS
         table.add_column(heading, justify="right" if right else "left", overflow="fold")

@@ -5,14 +5,17 @@ from __future__ import annotations
 import base64
 import html
 import io
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
 from linkwind.runs.validate.rows import Plot, Row
 
-_STYLE = """body { font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 72rem }
+_STYLE = """body { font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 90rem;
+padding: 0 1rem }
 table { border-collapse: collapse } td, th { padding: .25rem .6rem; text-align: left;
-border-bottom: 1px solid #ddd } td.n { text-align: right; font-variant-numeric: tabular-nums }
+border-bottom: 1px solid #ddd } td.n { text-align: right; font-variant-numeric: tabular-nums;
+white-space: nowrap }
 .no { color: #b00020; font-weight: 600 } .yes { color: #1b6e3c } img { max-width: 34rem; margin: .5rem }"""
 
 
@@ -42,6 +45,12 @@ def cells(row: Row) -> list[str]:
     ]  # fmt: skip
 
 
+def summary(rows: Sequence[Row]) -> str:
+    """Return how many rows are right, off, or only reported."""
+    counts = Counter(verdict(row) for row in rows)
+    return ", ".join(f"{counts[word]} {word}" for word in ("ok", "off", "reported") if counts[word])
+
+
 HEADINGS = ("Case", "Quantity", "Value", "Reference", "Ratio, error", "", "Time [s]", "Source")
 NUMBERS = ("Value", "Reference", "Ratio, error", "Time [s]")
 
@@ -57,9 +66,9 @@ def write(path: Path, title: str, rows: Sequence[Row], plots: Sequence[Plot], re
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(title)}</title>'
-        f"<style>{_STYLE}</style><h1>{html.escape(title)}</h1><table>{head}{body}</table>"
-        f"<p>{html.escape(remark)}</p>"
-        f"{pictures}</html>\n",
+        f"<style>{_STYLE}</style><h1>{html.escape(title)}</h1><p>{summary(rows)}</p>"
+        f"{pictures}<table>{head}{body}</table><p>{html.escape(remark)}</p>"
+        "</html>\n",
         encoding="utf-8",
     )
 
