@@ -13,10 +13,9 @@ from typing import Any
 
 import zenoh
 
-from linkwind.bus.zenoh import ZenohRouter, loopback_endpoint
+from linkwind.bus.zenoh import loopback_endpoint
 from linkwind.credentials import Identity
 from linkwind.credentials.authority import DEFAULT_ROLES, Role, issue
-from linkwind.credentials.checks import load_identity
 from linkwind.log.reader import open_log
 from linkwind.runs.verify import scenario_of, verify
 
@@ -35,15 +34,13 @@ class Bed:
         protocol = "tls" if secure else "tcp"
         self.direct, self.by_router = loopback_endpoint(protocol), loopback_endpoint(protocol)
         self._processes: list[subprocess.Popen[str]] = []
-        self._router: ZenohRouter | None = None
 
     def __enter__(self) -> Bed:
-        identity = load_identity(self.certs, "router") if self.secure else None
-        self._router = ZenohRouter([self.by_router], [], ["aero"], identity)
         where = ["--listen", self.direct, "--connect", self.by_router]
         settings = ["--set=time.end=1000", "--set=coupling.timeout=20"]
         self._start("dynamics", "two_link", "--run", RUN, "--out", "out", "--json", *where, *settings)
         self._start("aero", "--connect", self.by_router)
+        self._start("router", "--listen", self.by_router)  # of its own, for zenoh's threads are a process's
         self.await_steps()
         return self
 
@@ -80,7 +77,10 @@ class Bed:
         dynamics = self._processes[0]
         if dynamics.poll() is None:
             dynamics.send_signal(signal.SIGINT)
-        return "".join("".join(each.communicate(timeout=PATIENCE)) for each in self._processes)
+        ends = self._processes[:2]
+        said = "".join("".join(each.communicate(timeout=PATIENCE)) for each in ends)
+        self._processes[2].terminate()
+        return said
 
     def untouched(self) -> bool:
         """Tell whether every bit of the log, up to where the run was stopped, is what nobody disturbed."""
@@ -92,8 +92,6 @@ class Bed:
             if process.poll() is None:
                 os.kill(process.pid, signal.SIGKILL)
             process.communicate()
-        if self._router:
-            self._router.close()
 
 
 def attacker(
@@ -107,8 +105,6 @@ def attacker(
         "scouting/multicast/enabled": False,
         "transport/link/tx/lease": 1000,
     }
-    if region:
-        settings["region_name"] = region
     if identity:
         settings["transport/link/tls"] = {
             "root_ca_certificate": str(identity.ca),
