@@ -323,7 +323,7 @@ def test_a_lost_dynamics_ends_the_recording(tmp_path: Path) -> None:
     finally:
         process.kill()
         process.wait()
-    assert recording.error == "the dynamics was lost, or the network to it was cut"
+    assert recording.missed == recording.error == "the dynamics was lost, or the network to it was cut"
     assert open_log(recording.log).error == f"MissedError: {recording.error}"
 
 

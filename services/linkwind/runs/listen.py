@@ -35,7 +35,7 @@ class Recording:
     Attributes:
         scenario: its name.
         messages: that came.
-        missed: what did not, for people; empty if everything came.
+        missed: what did not, for people, or why that is not known; empty if everything came.
         error: what ended the run early; empty if it came to its end.
         log: the MCAP file.
     """
@@ -126,7 +126,7 @@ def _listen(
             break
         else:
             time.sleep(IDLE)
-    missed = log.finish(ending, reason)
+    missed = "; ".join(filter(None, (reason, log.finish(ending, reason))))
     error = reason
     if ending is not None and "error" in (end := ending.records.get(END, {})):
         error = f"{end['error']}: {end['text']}"
