@@ -73,10 +73,9 @@ class Bed:
         return True
 
     def stop(self) -> str:
-        """End the run as Ctrl-C does; return what dynamics and aero printed."""
-        dynamics = self._processes[0]
-        if dynamics.poll() is None:
-            dynamics.send_signal(signal.SIGINT)
+        """End the run as Ctrl-C does, unless it is over; return what dynamics and aero printed."""
+        if self.alive():
+            self._processes[0].send_signal(signal.SIGINT)
         ends = self._processes[:2]
         said = "".join("".join(each.communicate(timeout=PATIENCE)) for each in ends)
         self._processes[2].terminate()
