@@ -132,6 +132,7 @@ def test_builtin_names():
     assert builtin_names() == [
         "andrews",
         "bricard",
+        "chain",
         "cylinder",
         "falling_plate",
         "four_bar",
