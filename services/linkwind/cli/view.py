@@ -25,7 +25,10 @@ ViewOption = Annotated[
 ]
 HostOption = Annotated[
     str,
-    typer.Option("--host", help="Address to serve the page on; 0.0.0.0 shows it to other machines."),
+    typer.Option(
+        "--host",
+        help="Address to serve the page on; with 0.0.0.0 other machines see it and may hold the run.",
+    ),
 ]
 PortOption = Annotated[
     int, typer.Option("--port", min=0, max=65535, help="Port of the page; any that is free if not given.")

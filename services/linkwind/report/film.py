@@ -54,14 +54,7 @@ def film(flow: Flow) -> dict[str, Any]:
         "t": pack(flow.t[chosen], "f8"),
         "extent": pack(np.array(extents), "f8"),
         "quantities": {
-            name: {
-                "unit": quantity.unit,
-                "low": quantity.low,
-                "high": quantity.high,
-                "colours": base64.b64encode(quantity.colours.tobytes()).decode("ascii"),
-                "pictures": pictures[name],
-            }
-            for name, quantity in shown.items()
+            name: described(quantity) | {"pictures": pictures[name]} for name, quantity in shown.items()
         },
     }
 
@@ -72,6 +65,16 @@ def quantities(flow: Flow) -> dict[str, Quantity]:
     return {
         "vorticity": Quantity("1/s", -top, top, vorticity_colours(), lambda frame: frame.vorticity),
         "speed": Quantity("m/s", 0.0, fast, speed_colours(), speed),
+    }
+
+
+def described(quantity: Quantity) -> dict[str, Any]:
+    """Return what the page has to know of a quantity to colour its pictures."""
+    return {
+        "unit": quantity.unit,
+        "low": quantity.low,
+        "high": quantity.high,
+        "colours": base64.b64encode(quantity.colours.tobytes()).decode("ascii"),
     }
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from linkwind.frames import FlowFrame
 from linkwind.log.contents import FLOW
 from linkwind.report.closeup import closeups
-from linkwind.report.film import Quantity, picture, quantities
+from linkwind.report.film import Quantity, described, picture, quantities
 from linkwind.report.flow import survey
 from linkwind.view.recording import Recording
 
@@ -37,15 +36,7 @@ class Film:
         return {
             "provider": self._provider,
             "t": (times / 1e9).tolist(),
-            "quantities": {
-                name: {
-                    "unit": quantity.unit,
-                    "low": quantity.low,
-                    "high": quantity.high,
-                    "colours": base64.b64encode(quantity.colours.tobytes()).decode("ascii"),
-                }
-                for name, quantity in self._quantities.items()
-            },
+            "quantities": {name: described(quantity) for name, quantity in self._quantities.items()},
         }
 
     def _rescale(self, times: Any) -> None:

@@ -226,5 +226,5 @@ export function makeCharts(panels, clock, host, zoomed = () => {}) {
   clock.listen((t) => { place(t); for (const row of timed) row.show(t); });
   new ResizeObserver(() => place(clock.t)).observe(host);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => draw());
-  return { show, get range() { return range; } };
+  return { show };
 }
