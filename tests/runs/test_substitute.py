@@ -88,7 +88,7 @@ fy = "sin(t)"
     [
         ("two_link", ()),
         ("two_link_gust", ("coupling.scheme=implicit",)),
-        ("two_link_flow", ("aero.flow.cells=16", "aero.flow.frames=4", "log.checkpoint_every=15")),
+        ("two_link_flow", ("aero.flow.cells=16", "aero.flow.frames=1", "log.checkpoint_every=15")),
     ],
 )
 def test_the_same_provider_answers_the_same(name: str, settings: tuple[str, ...], tmp_path: Path) -> None:
