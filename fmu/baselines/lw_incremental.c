@@ -198,6 +198,7 @@ int32_t lw_incremental_attach(void *memory, lw_multibody *mb) {
     p->formulation.accelerations = accelerations;
     p->formulation.settle = settle;
     p->formulation.spring_energy = p->formulation.damper_power = nothing;
+    p->formulation.tree = NULL;
     p->formulation.occasion = NULL; /* there are no events */
     p->mass = (double *)(p + 1);
     p->right = p->mass + nv * nv;

@@ -98,7 +98,7 @@ void lw_joint_loads(lw_maximal *m, const lw_multibody *mb, const double *q) {
     for (int32_t i = 0; i < m->n; ++i) {
         const lw_link *joint = &m->tree->link[i], *child = &mb->link[i];
         m->load[i].linear = m->load[i].angular = zero;
-        if (!joint->sprung && !joint->damped) continue;
+        if (!joint->sprung && !joint->damped && !joint->driven) continue;
         coordinates(m, mb, i, q);
         lw_base b = base_of(mb, joint);
         lw_vec3 arm = joint_arm(joint, child);

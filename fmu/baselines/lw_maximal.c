@@ -58,18 +58,28 @@ static void set_reactions(const lw_maximal *m, lw_multibody *mb) {
     }
 }
 
+/* Those on bodies here; actuators go with the joints. */
+static int load_elements(lw_maximal *m, lw_multibody *mb, const double *q, lw_fault *fault) {
+    if (!mb->forces) return LW_OK;
+    m->tree->time = mb->time;
+    lw_joint_coordinates(m, mb, q);
+    return lw_elements_load(mb, m->tree, m->q, fault);
+}
+
 static int accelerations(lw_multibody *mb, const double *q, const double *v, const double *wrench,
                          double *joint_acceleration, lw_fault *fault) {
     lw_maximal *m = (lw_maximal *)mb->formulation;
     lw_maximal_follow(m, mb);
     lw_kinematics(mb, q, v);
     int status = lw_inverse_inertias(m, mb, fault);
-    if (status || (status = lw_elements_load(mb, fault))) return status;
+    if (status || (status = load_elements(m, mb, q, fault))) return status;
     for (int32_t i = 0; i < m->n; ++i) {
-        m->force[i] = lw_spatial_axpy(1.0, mb->load[i], own_force(mb, &mb->link[i], wrench));
+        m->force[i] = own_force(mb, &mb->link[i], wrench);
+        if (mb->forces) m->force[i] = lw_spatial_axpy(1.0, mb->load[i], m->force[i]);
         mb->link[i].bias_force = none;
     }
     lw_joint_loads(m, mb, q);
+    if ((status = lw_elements_check(m->tree, fault))) return status;
     for (int32_t i = 0; i < m->n; ++i)
         mb->link[i].acceleration = lw_spatial_times(&m->inverse[i], m->force[i]);
     lw_constraint_equations(m, mb);
@@ -193,6 +203,7 @@ void lw_maximal_attach(void *memory, lw_multibody *bodies, lw_multibody *tree, i
     m->formulation.settle = lw_maximal_settle;
     m->formulation.spring_energy = spring_energy;
     m->formulation.damper_power = damper_power;
+    m->formulation.tree = tree;
     m->formulation.occasion = lw_maximal_occasion;
     m->tree = tree;
     m->n = tree->n;

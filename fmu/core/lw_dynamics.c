@@ -95,12 +95,13 @@ LW_INLINE int eliminate(lw_link *l, lw_inertia6 *i, lw_spatial *f, const double 
         double pivot = slides ? lw_dot(c->s.linear, c->u.linear) : power(c->u, c->s);
         double scale = lw_dot(c->s.linear, c->s.linear) * l->mass_scale + (slides ? 0.0 : l->inertia_scale);
         if (isnan(pivot)) return LW_NOT_FINITE;
-        if (!(pivot > pivot_tolerance * scale)) return LW_SINGULAR;
-        c->inverse = 1.0 / pivot;
+        int given = l->prescribed >> k & 1;
+        if (!given && !(pivot > pivot_tolerance * scale)) return LW_SINGULAR;
+        c->inverse = given ? 0.0 : 1.0 / pivot;
         c->force = joint_force[k] - (slides ? lw_dot(c->s.linear, f->linear) : power(*f, c->s));
         if (l->parent < 0 && k + 1 == l->columns) return LW_OK; /* the world takes the rest */
-        give_way(i, c->u, c->inverse);
-        *f = spatial_axpy(c->force * c->inverse, c->u, *f);
+        if (!given) give_way(i, c->u, c->inverse);
+        *f = spatial_axpy(given ? c->given : c->force * c->inverse, c->u, *f);
     }
     return LW_OK;
 }
@@ -143,7 +144,7 @@ static int inward(lw_multibody *mb, lw_link *l, const double *joint_force) {
 
 /* ---- from the roots to the leaves ---- */
 
-static void outward(const lw_multibody *mb, lw_link *l, lw_spatial a, double *joint_acceleration) {
+static void outward(const lw_multibody *mb, lw_link *l, lw_spatial a, int with_bias, double *joint_acceleration) {
     if (l->parent >= 0) {
         lw_spatial base = mb->link[l->parent].acceleration;
         a.angular = lw_add(a.angular, base.angular);
@@ -151,10 +152,12 @@ static void outward(const lw_multibody *mb, lw_link *l, lw_spatial a, double *jo
     }
     for (int k = l->columns; k < l->freedoms; ++k) joint_acceleration[l->v + k] = 0.0; /* locked */
     for (int k = l->columns - 1; k >= 0; --k) {
-        const lw_column *c = &l->column[k];
-        double own = (c->force - power(c->u, a)) * c->inverse;
+        lw_column *c = &l->column[k];
+        int given = l->prescribed >> k & 1;
+        double own = given ? (with_bias ? c->given : 0.0) : (c->force - power(c->u, a)) * c->inverse;
         joint_acceleration[l->v + k] = own;
         a = spatial_axpy(own, c->s, a);
+        if (given) c->effort = power(c->u, a) - c->force;
     }
     l->acceleration = a;
 }
@@ -162,7 +165,7 @@ static void outward(const lw_multibody *mb, lw_link *l, lw_spatial a, double *jo
 void lw_outward(lw_multibody *mb, int with_bias, double *joint_acceleration) {
     static const lw_spatial none = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
     for (int i = 0; i < mb->n; ++i)
-        outward(mb, &mb->link[i], with_bias ? mb->link[i].bias : none, joint_acceleration);
+        outward(mb, &mb->link[i], with_bias ? mb->link[i].bias : none, with_bias, joint_acceleration);
 }
 
 int lw_tree_accelerations(lw_multibody *mb, const double *q, const double *v, const double *wrench,
@@ -170,21 +173,22 @@ int lw_tree_accelerations(lw_multibody *mb, const double *q, const double *v, co
     lw_kinematics(mb, q, v);
     for (int i = 0; i < mb->n; ++i) start(&mb->link[i], mb->gravity, wrench + 6 * mb->link[i].body);
     if (mb->forces) {
-        int status = lw_elements_load(mb, fault);
+        int status = lw_elements_load(mb, mb, q, fault);
         if (status) return status;
+        lw_prescribe_accelerations(mb, 0);
         for (int i = 0; i < mb->n; ++i)
             mb->link[i].bias_force = spatial_axpy(-1.0, mb->load[i], mb->link[i].bias_force);
     }
     for (int i = mb->n - 1; i >= 0; --i) {
         lw_link *l = &mb->link[i];
         double joint_force[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-        if (l->sprung || l->damped) lw_joint_force(mb, l, q, v, joint_force);
+        if (l->sprung || l->damped || l->driven) lw_joint_force(mb, l, q, v, joint_force);
         int status = inward(mb, l, joint_force);
         fault->item = l->body;
         if (status) return status;
     }
     lw_outward(mb, 1, joint_acceleration);
-    return LW_OK;
+    return mb->forces ? lw_elements_check(mb, fault) : LW_OK;
 }
 
 int lw_accelerations(lw_multibody *mb, const double *q, const double *v, const double *wrench,
@@ -248,12 +252,23 @@ int lw_loaded_accelerations(lw_multibody *mb, const double *q, const double *v, 
     return lw_tree_accelerations(mb, q, v, mb->loaded, joint_acceleration, fault);
 }
 
-int lw_multibody_evaluate(lw_multibody *mb, const double *state, const double *wrench,
+static void store_elements(lw_multibody *mb, const lw_evaluation *e) {
+    double supplied = 0.0, dissipated = 0.0;
+    lw_elements_power(mb, &supplied, &dissipated);
+    for (int32_t i = 0; i < mb->forces; ++i) {
+        const lw_multibody *joints = mb->formulation && mb->element[i].type == LW_ACTUATOR ? mb->formulation->tree : mb;
+        e->effort[i] = joints->element[i].effort;
+        e->power[i] = joints->element[i].power;
+    }
+}
+
+int lw_multibody_evaluate(lw_multibody *mb, const double *state, double time, const double *wrench,
                           const double *added_inertia, const lw_evaluation *e, lw_fault *fault) {
     int status = lw_inputs_check(mb, state, 1, wrench, added_inertia, fault);
     if (status) return status;
     lw_modes(mb, state + mb->nq + mb->nv + 1);
     lw_bind_added(mb, added_inertia);
+    if ((status = lw_take_time(mb, time, fault))) return status;
     for (int k = 0; k < mb->nv; ++k) e->joint_acceleration[k] = 0.0;
     status = lw_loaded_accelerations(mb, state, state + mb->nq, wrench, e->joint_acceleration,
                                      e->closure_reaction, fault);
@@ -264,6 +279,7 @@ int lw_multibody_evaluate(lw_multibody *mb, const double *state, const double *w
         store6(e->reaction + 6 * l->body, lw_joint_reaction(l));
         store6(e->total_wrench + 6 * l->body, lw_total_wrench(l, wrench));
     }
+    store_elements(mb, e);
     return LW_OK;
 }
 
@@ -273,6 +289,7 @@ int lw_multibody_evaluate(lw_multibody *mb, const double *state, const double *w
 int lw_impulse_response(lw_multibody *mb, const double *impulse, double *joint_velocity, lw_fault *fault) {
     static const lw_vec3 none = {0.0, 0.0, 0.0};
     static const double calm[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+    lw_prescribe_accelerations(mb, 1);
     for (int i = 0; i < mb->n; ++i) start(&mb->link[i], none, impulse + 6 * mb->link[i].body);
     for (int i = mb->n - 1; i >= 0; --i) {
         int status = inward(mb, &mb->link[i], calm);
@@ -289,6 +306,7 @@ int lw_multibody_repeat(lw_multibody *mb, const double *state, int32_t repeats) 
     for (int k = 0; k < 6 * mb->n; ++k) mb->wrench[k] = 0.0;
     lw_modes(mb, state + mb->nq + mb->nv + 1);
     lw_bind_added(mb, NULL);
+    status = lw_take_time(mb, 0.0, &fault);
     for (int32_t k = 0; k < repeats && !status; ++k)
         status = lw_accelerations(mb, state, state + mb->nq, mb->wrench, mb->trial, &fault);
     return status;

@@ -166,10 +166,10 @@ static int is_due(double value) { return value >= 0.0; }
 int lw_events_due(lw_multibody *mb, const double *y, double time, const double *wrench, int *due,
                   lw_fault *fault) {
     double *values = mb->indicator;
-    int pending = 0, status = LW_OK;
+    int pending = 0, status = lw_take_time(mb, time, fault);
     *due = 0;
     for (int32_t i = 0; i < mb->events; ++i) pending |= is_pending(mb, i);
-    if (pending) status = indicators(mb, y, time, wrench, values, fault);
+    if (pending && !status) status = indicators(mb, y, time, wrench, values, fault);
     for (int32_t i = 0; i < mb->events && pending && !status; ++i)
         if (is_due(values[i])) *due = 1, fault->item = i;
     return status;
@@ -261,9 +261,12 @@ static int happen(lw_multibody *mb, int32_t i, double *y, double time, double h,
 
 int lw_events_happen(lw_multibody *mb, double *y, double time, double h, double slack, const double *wrench,
                      lw_fault *fault) {
+    int status = lw_take_time(mb, time, fault);
+    if (status) return status;
     for (int32_t i = 0; i < mb->events; ++i) {
         double *values = mb->indicator;
-        int status = indicators(mb, y, time, wrench, values, fault), due = is_due(values[i] + slack);
+        status = indicators(mb, y, time, wrench, values, fault);
+        int due = is_due(values[i] + slack);
         if (!status && due) status = happen(mb, i, y, time, h, wrench, fault);
         if (status) return status;
     }
@@ -293,5 +296,6 @@ int lw_multibody_indicators(lw_multibody *mb, const double *state, double time, 
     if (status) return status;
     lw_modes(mb, state + mb->nq + mb->nv + 1);
     lw_bind_added(mb, added_inertia);
+    if ((status = lw_take_time(mb, time, fault))) return status;
     return indicators(mb, state, time, wrench, values, fault);
 }

@@ -21,18 +21,28 @@ static const double *wrench_at(lw_run *run, double s) {
     return run->mb->wrench;
 }
 
-/* dy/dt at `s`, in units of the macro step. */
-static int derive(lw_run *run, double s, const double *y, double *rate) {
+static int prescribe(lw_run *run, double time, double *y) {
+    int status = lw_take_time(run->mb, time, run->step->fault);
+    if (!status) lw_prescribe(run->mb, y, y + run->mb->nq);
+    return status;
+}
+
+/* dy/dt at `s`, in units of the macro step, and `time` [s]; what is prescribed goes into y. */
+static int derive(lw_run *run, double s, double time, double *y, double *rate) {
     lw_multibody *mb = run->mb;
     const double *wrench = wrench_at(run, s), *v = y + mb->nq;
-    int status = lw_accelerations(mb, y, v, wrench, rate + mb->nq, run->step->fault);
+    double *powers = rate + mb->nq + mb->nv;
+    int status = mb->forces ? prescribe(run, time, y) : LW_OK;
+    if (!status) status = lw_accelerations(mb, y, v, wrench, rate + mb->nq, run->step->fault);
     if (status) {
         run->step->fault->time = s * run->step->h;
         return status;
     }
     lw_coordinate_rate(mb, y, v, rate);
-    rate[mb->nq + mb->nv] = lw_wrench_power(mb, wrench);
-    rate[mb->nq + mb->nv + 1] = lw_damper_power(mb, v) + lw_elements_dissipated(mb);
+    powers[0] = lw_wrench_power(mb, wrench);
+    powers[1] = lw_damper_power(mb, v);
+    lw_elements_power(mb, &powers[0], &powers[1]);
+    if (mb->formulation && mb->formulation->tree) lw_elements_power(mb->formulation->tree, &powers[0], &powers[1]);
     return LW_OK;
 }
 
@@ -43,7 +53,7 @@ static int overflowed(const double *values, int first, int count) {
 }
 
 /* Every accepted substep ends here: unit quaternions, finite numbers, closed loops, what a formulation adds. */
-static int settle(lw_run *run, double *y, double s) {
+static int settle(lw_run *run, double *y, double s, double time) {
     lw_multibody *mb = run->mb;
     lw_coordinate_normalise(mb, y);
     for (int i = 0; i < mb->n; ++i) {
@@ -54,6 +64,8 @@ static int settle(lw_run *run, double *y, double s) {
         return LW_NOT_FINITE;
     }
     run->step->fault->time = s * run->step->h;
+    int status = mb->forces ? prescribe(run, time, y) : LW_OK;
+    if (status) return status;
     if (mb->formulation) return mb->formulation->settle(mb, y, y + mb->nq, run->step->fault);
     return mb->rows ? lw_project(mb, y, y + mb->nq, run->step->fault) : LW_OK;
 }
@@ -104,50 +116,50 @@ static void combine(const lw_multibody *mb, int count, const double *weights, do
     }
 }
 
-/* The rates from stage `first` on, for a substep of `h` [s] from `s`; `width` is h in macro steps. */
-static int stages(lw_run *run, const lw_tableau *t, int first, double s, double width, double h) {
+/* The rates from stage `first` on, for a substep of `h` [s] from `s` and `time`; `width` is h in macro steps. */
+static int stages(lw_run *run, const lw_tableau *t, int first, double s, double time, double width, double h) {
     lw_multibody *mb = run->mb;
     for (int i = first; i < t->stages; ++i) {
-        const double *y = mb->y;
+        double *y = mb->y;
         if (i > 0) {
             combine(mb, i, t->a[i], h, mb->trial);
             y = mb->trial;
         }
-        int status = derive(run, s + t->c[i] * width, y, mb->rate[i]);
+        int status = derive(run, s + t->c[i] * width, time + t->c[i] * h, y, mb->rate[i]);
         if (status) return status;
     }
     return LW_OK;
 }
 
-static int runge_kutta(lw_run *run, const lw_tableau *t, double s, double width, double h) {
+static int runge_kutta(lw_run *run, const lw_tableau *t, double s, double time, double width, double h) {
     lw_multibody *mb = run->mb;
-    int status = stages(run, t, 0, s, width, h);
+    int status = stages(run, t, 0, s, time, width, h);
     if (status) return status;
     combine(mb, t->stages, t->b, h, mb->y);
-    return settle(run, mb->y, s + width);
+    return settle(run, mb->y, s + width, time + h);
 }
 
 /* ---- semi-implicit Euler: the position moves with the new velocity ---- */
 
-static int semi_implicit_euler(lw_run *run, double s, double width, double h) {
+static int semi_implicit_euler(lw_run *run, double s, double time, double width, double h) {
     lw_multibody *mb = run->mb;
     double *y = mb->y, *rate = mb->rate[0];
-    int status = derive(run, s, y, rate);
+    int status = derive(run, s, time, y, rate);
     if (status) return status;
     for (int i = mb->nq; i < length(mb); ++i) y[i] += h * rate[i];
     lw_coordinate_rate(mb, y, y + mb->nq, rate);
     for (int i = 0; i < mb->nq; ++i) y[i] += h * rate[i];
-    return settle(run, y, s + width);
+    return settle(run, y, s + width, time + h);
 }
 
-/* ---- one step of a method, of `h` [s] from s; `width` is h, and s is, in macro steps ---- */
+/* ---- one step of a method, of `h` [s] from s and `time`; `width` is h, and s is, in macro steps ---- */
 
-static int substep(lw_run *run, double s, double width, double h) {
+static int substep(lw_run *run, double s, double time, double width, double h) {
     switch (run->step->integrator) {
-    case LW_EULER: return runge_kutta(run, &euler, s, width, h);
-    case LW_SEMI_IMPLICIT_EULER: return semi_implicit_euler(run, s, width, h);
-    case LW_RK4: return runge_kutta(run, &rk4, s, width, h);
-    default: return runge_kutta(run, &dopri5, s, width, h);
+    case LW_EULER: return runge_kutta(run, &euler, s, time, width, h);
+    case LW_SEMI_IMPLICIT_EULER: return semi_implicit_euler(run, s, time, width, h);
+    case LW_RK4: return runge_kutta(run, &rk4, s, time, width, h);
+    default: return runge_kutta(run, &dopri5, s, time, width, h);
     }
 }
 
@@ -161,7 +173,7 @@ static void remember(lw_multibody *mb) { memcpy(mb->before, mb->y, (size_t)lengt
 
 static int again(lw_run *run, double s, double width) {
     memcpy(run->mb->y, run->mb->before, (size_t)length(run->mb) * sizeof(double));
-    return substep(run, s, width, width * run->step->h);
+    return substep(run, s, at(run, s), width, width * run->step->h);
 }
 
 static int due(lw_run *run, double s, int *found) {
@@ -196,7 +208,7 @@ static int watch(lw_run *run, double s, double end, double h) {
         status = lw_events_happen(mb, mb->y, at(run, s), h, 0.0, wrench_at(run, s), run->step->fault);
         if (status || !(end > s)) return status;
         remember(mb);
-        if ((status = substep(run, s, end - s, (end - s) * run->step->h))) return status;
+        if ((status = substep(run, s, at(run, s), end - s, (end - s) * run->step->h))) return status;
     }
     run->step->fault->time = s * run->step->h;
     return mb->events ? LW_CROWDED : LW_OK;
@@ -206,7 +218,8 @@ static int equal_substeps(lw_run *run) {
     double h = run->step->h / run->step->substeps, width = 1.0 / run->step->substeps;
     for (int32_t k = 0; k < run->step->substeps; ++k) {
         if (run->mb->events) remember(run->mb);
-        int status = substep(run, k * width, width, h);
+        double time = run->step->time + run->step->h * k / run->step->substeps;
+        int status = substep(run, k * width, time, width, h);
         if (!status) status = watch(run, k * width, (k + 1) * width, h);
         if (status) return status;
     }
@@ -246,10 +259,10 @@ static int accept(lw_run *run, double from, double time) {
     double *last = mb->rate[6];
     mb->rate[6] = mb->rate[0];
     mb->rate[0] = last;
-    int status = settle(run, mb->y, time / run->step->h);
+    int status = settle(run, mb->y, time / run->step->h, run->step->time + time);
     if (!status) status = watch(run, from / run->step->h, time / run->step->h, time - from);
     if (!status && (mb->formulation || mb->rows || run->interrupted))
-        return derive(run, time / run->step->h, mb->y, mb->rate[0]);
+        return derive(run, time / run->step->h, run->step->time + time, mb->y, mb->rate[0]);
     lw_coordinate_rate(mb, mb->y, mb->y + mb->nq, mb->rate[0]);
     return status;
 }
@@ -260,7 +273,7 @@ static int dormand_prince(lw_run *run) {
     lw_multibody *mb = run->mb;
     double time = 0.0, h = run->step->h, limit = run->step->h / run->step->substeps, largest = 5.0;
     double next = run->proposed > 0.0 ? fmin(run->proposed, limit) : limit;
-    int trouble = LW_OK, status = derive(run, 0.0, mb->y, mb->rate[0]);
+    int trouble = LW_OK, status = derive(run, 0.0, run->step->time, mb->y, mb->rate[0]);
     if (run->proposed <= 0.0) run->proposed = next;
     for (int tried = 0; !status && time < h; ++tried) {
         int last = time + 1.01 * next >= h;
@@ -270,7 +283,7 @@ static int dormand_prince(lw_run *run) {
             return trouble ? trouble : LW_STEP_UNDERFLOW;
         }
         /* A stage that cannot be evaluated means that the step is too long, until none is short enough. */
-        trouble = stages(run, &dopri5, 1, time / h, step / h, step);
+        trouble = stages(run, &dopri5, 1, time / h, run->step->time + time, step / h, step);
         double norm = trouble ? HUGE_VAL : error_norm(run, step), factor = step_factor(norm);
         int clipped = factor >= largest;
         next = step * fmin(factor, largest);

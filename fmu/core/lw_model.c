@@ -21,11 +21,11 @@ size_t lw_multibody_size(const lw_tables *t) {
     doubles += rows * nv + 2 * rows * rows + 4 * rows + 6 * closures + 2 * events;
     return sizeof(lw_multibody) + n * (sizeof(lw_link) + sizeof(lw_spatial)) + forces * sizeof(lw_element) +
            closures * sizeof(lw_closure) + rows * sizeof(lw_row) + events * sizeof(lw_event) +
-           doubles * sizeof(double) + paths / 2 * 2 * sizeof(int32_t);
+           (doubles + (size_t)t->constants + (size_t)t->instructions) * sizeof(double) + paths / 2 * 2 * sizeof(int32_t);
 }
 
 /* Cut the block behind the struct into its arrays. */
-static void lay_out(lw_multibody *mb) {
+static void lay_out(lw_multibody *mb, int32_t constants, int32_t instructions) {
     size_t n = (size_t)mb->n, length = vector_length(mb->nq, mb->nv), rows = (size_t)mb->rows;
     mb->link = (lw_link *)(mb + 1);
     mb->load = (lw_spatial *)(mb->link + n);
@@ -49,6 +49,8 @@ static void lay_out(lw_multibody *mb) {
     mb->stiffness = next, next += mb->nv;
     mb->damping = next, next += mb->nv;
     mb->rest = next, next += mb->nq;
+    mb->constants = next, next += constants;
+    mb->code = (int32_t *)next, next += instructions; /* two to a double */
     mb->wrench = next, next += 6 * n;
     mb->y = next, next += length;
     mb->trial = next, next += length;
@@ -137,7 +139,8 @@ int lw_multibody_init(lw_multibody *mb, const lw_tables *t, lw_fault *fault) {
     mb->events = t->events;
     mb->rows = lw_closure_row_count(t);
     mb->gravity = lw_load3(t->gravity);
-    lay_out(mb);
+    lay_out(mb, t->constants, t->instructions);
+    mb->time = 0.0;
     memcpy(mb->stiffness, t->stiffness, (size_t)t->nv * sizeof(double));
     memcpy(mb->damping, t->damping, (size_t)t->nv * sizeof(double));
     memcpy(mb->rest, t->rest, (size_t)t->nq * sizeof(double));

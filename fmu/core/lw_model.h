@@ -2,6 +2,7 @@
 #ifndef LW_MODEL_H
 #define LW_MODEL_H
 
+#include "lw_expression.h"
 #include "lw_multibody.h"
 
 typedef struct { lw_vec3 linear, angular; } lw_spatial; /* twist, acceleration, or (force, torque) */
@@ -16,7 +17,8 @@ typedef struct {
 typedef struct {
     lw_spatial s;           /* motion of the child's COM per unit of velocity, in W */
     lw_spatial u;           /* articulated inertia times s */
-    double force, inverse;  /* net generalised force; 1 / (s . u) */
+    double force, inverse;  /* net generalised force; 1 / (s . u), or 0 where the acceleration is given */
+    double given, effort;   /* that; the force that it takes */
 } lw_column;
 
 /* A body, and the joint that carries it. */
@@ -26,7 +28,8 @@ typedef struct {
     int32_t type, q, v, translations;
     int32_t freedoms, columns; /* of the type; of them those that are not locked */
     int32_t built, built_sprung, built_damped; /* as at first */
-    int32_t parent_rotated, child_rotated, sprung, damped;
+    int32_t parent_rotated, child_rotated, sprung, damped, driven;
+    int32_t prescribed; /* bits: columns whose acceleration is given */
     lw_vec3 parent_point, child_point, axis; /* axis: the joint's z in the parent's body frame */
     lw_quat parent_quat, child_quat_inverse;
     lw_mat3 parent_matrix, child_matrix;
@@ -73,11 +76,13 @@ typedef struct {
 
 /* A force element, and what it does at the present evaluation. */
 typedef struct {
-    int32_t type, link[2]; /* -1 = world */
+    int32_t type, link[2], coordinate; /* -1 = world */
     lw_vec3 point[2];
     double number[3];
-    double effort;     /* tension [N] */
-    double dissipated; /* power [W] */
+    const int32_t *code, *end;
+    lw_jet motion; /* at the present time */
+    double effort, power; /* as lw_evaluation */
+    double supplied, dissipated; /* of the power: without what is in an energy; taken by its damper [W] */
 } lw_element;
 
 enum { LW_MAX_STAGES = 7 };
@@ -89,6 +94,7 @@ typedef struct {
     int (*settle)(lw_multibody *multibody, double *q, double *v, lw_fault *fault); /* after every substep */
     double (*spring_energy)(const lw_multibody *multibody, const double *q);
     double (*damper_power)(const lw_multibody *multibody, const double *v);
+    lw_multibody *tree; /* its joints, with their actuators */
     double (*occasion)(lw_multibody *multibody, int32_t event, const double *y, double time); /* seen from it */
 } lw_formulation;
 
@@ -99,6 +105,9 @@ struct lw_multibody {
     lw_link *link; /* n, in topological order */
     double *stiffness, *damping, *rest;
     int32_t forces;
+    double time; /* of the present evaluation [s] */
+    int32_t *code;     /* programs of force elements, and what they push */
+    double *constants;
     lw_element *element; /* forces */
     lw_spatial *load;    /* n: force and torque of all elements on each link, in W at the COM */
     int32_t closures, rows, events;
@@ -162,11 +171,19 @@ void lw_joint_force(const lw_multibody *multibody, const lw_link *link, const do
                     double *force);
 double lw_spring_energy(const lw_multibody *multibody, const double *q);
 double lw_damper_power(const lw_multibody *multibody, const double *v);
-/* lw_elements.c, after lw_kinematics: set the load of all force elements; what their dampers take [W]; energy of
- * their springs [J]. */
+/* lw_elements.c: set the present time, and with it what motions prescribe; put that into q and v, or into the
+ * accelerations that lw_dynamics.c takes as given. */
 void lw_elements_build(lw_multibody *multibody, const lw_tables *tables);
-int lw_elements_load(lw_multibody *multibody, lw_fault *fault);
-double lw_elements_dissipated(const lw_multibody *multibody);
+int lw_take_time(lw_multibody *multibody, double time, lw_fault *fault);
+void lw_prescribe(const lw_multibody *multibody, double *q, double *v);
+void lw_prescribe_accelerations(lw_multibody *multibody, int at_rest);
+/* After lw_kinematics: set the loads on the bodies, of which q of a tree tells the turns; add the actuators' forces
+ * to those of a joint; did these give numbers; add the power of all [W]; energy [J]. */
+int lw_elements_load(lw_multibody *multibody, const lw_multibody *tree, const double *q, lw_fault *fault);
+void lw_elements_drive(const lw_multibody *multibody, const lw_link *link, const double *q, const double *v,
+                       double *force);
+int lw_elements_check(const lw_multibody *multibody, lw_fault *fault);
+void lw_elements_power(lw_multibody *multibody, double *supplied, double *dissipated);
 double lw_elements_energy(const lw_multibody *multibody);
 /* lw_dynamics.c: set the added inertia of the coming evaluations; accelerations; power of the wrench. */
 void lw_bind_added(lw_multibody *multibody, const double *added_inertia);

@@ -42,14 +42,21 @@ typedef enum {
     LW_ON_DISTANCE  /* between the joint's two points [m] */
 } lw_occasion;
 
-typedef enum { LW_SPRING } lw_force_type; /* between two points */
-enum { LW_FORCE_TYPES = 1 };
+typedef enum {
+    LW_SPRING,      /* between two points of two bodies; its program gives tension from length, rate, t */
+    LW_ACTUATOR,    /* along a joint's coordinate; its program gives force or torque from t, q, v */
+    LW_MOTION,      /* a joint's coordinate as a program of t */
+    LW_POINT_FORCE, /* on a body; its program gives (fx, fy, fz, tx, ty, tz) from (t, x, y, z, vx, vy, vz, wx, wy,
+                       wz, theta) of its COM */
+    LW_BUOYANCY     /* on a body, at its centre of volume */
+} lw_force_type;
+enum { LW_FORCE_TYPES = 5 };
 
 /* A mechanism. Joint i carries body i; q_index and v_index are explicit, so that a joint may own more
  * coordinates than its type needs. Coordinates that no joint uses keep their value. Closures are joints
  * that close loops of the tree. */
 typedef struct {
-    int32_t n, nq, nv, closures, events, forces;
+    int32_t n, nq, nv, closures, events, forces, instructions, constants;
     const int32_t *parent;         /* (n) index of the parent body, -1 = world */
     const int32_t *order;          /* (n) the bodies, every parent before its children */
     const int32_t *joint_type;     /* (n) lw_joint_type */
@@ -77,9 +84,15 @@ typedef struct {
     const double *event_threshold;  /* (events) */
     const double *event_restitution; /* (events) of a stop: speed after over speed before, 0 to 1 */
     const int32_t *force_type;   /* (forces) lw_force_type */
-    const int32_t *force_body;   /* (forces,2) -1 = world */
+    const int32_t *force_body;   /* (forces,2) of a spring two, -1 = world; else the body, of an actuator and a
+                                    motion the one that the joint carries, and the number of the coordinate */
     const double *force_point;   /* (forces,2,3) on the bodies, body frame, from the COM [m] */
-    const double *force_number;  /* (forces,3) stiffness [N/m], damping [N s/m], length at rest [m] */
+    const double *force_number;  /* (forces,3) stiffness [N/m], damping [N s/m], length at rest [m] of a spring;
+                                    of a point force whether it is in the body frame; volume [m3], density
+                                    [kg/m3] */
+    const int32_t *force_start;  /* (forces + 1) first instruction of each program, which may be empty */
+    const int32_t *force_code;   /* (instructions,2) as lw_expression.h */
+    const double *force_constants; /* (constants) */
 } lw_tables;
 
 /* 0 is success; `lw_fault` names the item and the time. */
@@ -97,7 +110,8 @@ typedef enum {
     LW_JOINT_OPEN,           /* item: body whose joint cannot be closed */
     LW_OPEN,                 /* item: closure that the mechanism cannot close */
     LW_CROWDED,              /* item: event that happens too often in a step */
-    LW_POINTS_MEET = 14,     /* item: force element whose points coincide, so that it has no direction */
+    LW_FORCE_NOT_FINITE = 13, /* item: force element whose program gives no number */
+    LW_POINTS_MEET,          /* item: force element whose points coincide, so that it has no direction */
     /* arguments */
     LW_BAD_STEP = 20,
     LW_BAD_NODES,
@@ -135,7 +149,8 @@ typedef enum {
     LW_BAD_FORCE_TYPE = 70,
     LW_BAD_FORCE_BODY,
     LW_BAD_FORCE_POINT,
-    LW_BAD_FORCE_NUMBER
+    LW_BAD_FORCE_NUMBER,
+    LW_BAD_FORCE_START
 } lw_status;
 
 typedef struct {
@@ -211,12 +226,18 @@ typedef struct {
     double *acceleration;       /* (n,6) linear first */
     double *reaction;           /* (n,6) of parent on child at the joint's point on the child */
     double *total_wrench;       /* (n,6) */
+    double *effort, *power;     /* (forces) tension, size of the force, force or torque along the coordinate; what
+                                   it gives to the bodies [W] */
     double *closure_reaction;   /* (closures,6) of the first on the second body at the point on the second */
 } lw_evaluation;
 
-LW_API int lw_multibody_evaluate(lw_multibody *multibody, const double *state, const double *wrench,
+/* At a state, at `time` [s]. */
+LW_API int lw_multibody_evaluate(lw_multibody *multibody, const double *state, double time, const double *wrench,
                                  const double *added_inertia, const lw_evaluation *evaluation,
                                  lw_fault *fault);
+
+/* Put the coordinates (in place) that motions prescribe to what they are at `time` [s], and their rates. */
+LW_API int lw_multibody_prescribe(lw_multibody *multibody, double *state, double time, lw_fault *fault);
 
 /* Number of rows of all closures. */
 LW_API int32_t lw_closure_row_count(const lw_tables *tables);

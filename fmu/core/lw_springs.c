@@ -36,6 +36,7 @@ void lw_joint_force(const lw_multibody *mb, const lw_link *l, const double *q, c
     }
     if (l->damped)
         for (int k = 0; k < l->columns; ++k) force[k] -= mb->damping[l->v + k] * v[l->v + k];
+    if (l->driven) lw_elements_drive(mb, l, q, v, force);
 }
 
 static double link_energy(const lw_multibody *mb, const lw_link *l, const double *q) {

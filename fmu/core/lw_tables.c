@@ -141,19 +141,28 @@ static int check_event(const lw_tables *t, int i) {
     return LW_OK;
 }
 
+static int force_bodies_fit(const lw_tables *t, int i) {
+    int32_t type = t->force_type[i], first = t->force_body[2 * i], second = t->force_body[2 * i + 1];
+    if (first < (type == LW_SPRING ? -1 : 0) || first >= t->n) return 0;
+    if (type == LW_ACTUATOR || type == LW_MOTION) return second >= 0 && second < lw_joint_nv(t->joint_type[first]);
+    return second >= -1 && second < t->n && first != second;
+}
+
 static int check_force(const lw_tables *t, int i) {
-    const int32_t *body = t->force_body + 2 * i;
     if (t->force_type[i] < 0 || t->force_type[i] >= LW_FORCE_TYPES) return LW_BAD_FORCE_TYPE;
-    if (body[0] < -1 || body[0] >= t->n || body[1] < -1 || body[1] >= t->n || body[0] == body[1])
-        return LW_BAD_FORCE_BODY;
+    if (!force_bodies_fit(t, i)) return LW_BAD_FORCE_BODY;
     if (!all_finite(t->force_point + 6 * i, 6)) return LW_BAD_FORCE_POINT;
-    return all_finite(t->force_number + 3 * i, 3) ? LW_OK : LW_BAD_FORCE_NUMBER;
+    if (!all_finite(t->force_number + 3 * i, 3)) return LW_BAD_FORCE_NUMBER;
+    int32_t start = t->force_start[i], end = t->force_start[i + 1];
+    return start >= 0 && start <= end && end <= t->instructions ? LW_OK : LW_BAD_FORCE_START;
 }
 
 int lw_tables_check(const lw_tables *t, lw_fault *fault) {
     fault->item = 0;
     fault->time = 0.0;
-    if (t->n < 1 || t->nq < 0 || t->nv < 0 || t->closures < 0 || t->events < 0 || t->forces < 0) return LW_BAD_COUNT;
+    if (t->n < 1 || t->nq < 0 || t->nv < 0 || t->closures < 0 || t->events < 0 || t->forces < 0 ||
+        t->instructions < 0 || t->constants < 0)
+        return LW_BAD_COUNT;
     if (!all_finite(t->gravity, 3)) return LW_BAD_GRAVITY;
     int status = check_coordinate_values(t, fault);
     for (int i = 0; i < t->n && !status; ++i) {

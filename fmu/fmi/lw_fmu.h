@@ -26,6 +26,7 @@
     X(REACTION_FORCE, 3 * n) X(REACTION_TORQUE, 3 * n)                                                   \
     X(CLOSURE_FORCE, 3 * lw_fmu_closures) X(CLOSURE_TORQUE, 3 * lw_fmu_closures)                         \
     X(EVENT_TIME, lw_fmu_events) X(EVENT_INDICATOR, lw_fmu_events)                                       \
+    X(FORCE_EFFORT, lw_fmu_forces) X(FORCE_POWER, lw_fmu_forces)                                         \
     X(KINETIC_ENERGY, 1) X(POTENTIAL_ENERGY, 1)
 
 /* A field leaves density, wind, length and span unused (no variable refers to them). */
@@ -79,6 +80,8 @@ extern const double lw_fmu_event_threshold[], lw_fmu_event_restitution[];
 extern const double lw_fmu_closure_point[], lw_fmu_closure_rotation[], lw_fmu_closure_length[];
 extern const int32_t lw_fmu_forces, lw_fmu_force_type[], lw_fmu_force_body[];
 extern const double lw_fmu_force_point[];
+extern const int32_t lw_fmu_instructions, lw_fmu_constants, lw_fmu_force_start[], lw_fmu_force_code[];
+extern const double lw_fmu_force_constants[];
 
 /* ---- aero ---- */
 enum { LW_AERO_PLATE, LW_AERO_FIELD };

@@ -62,6 +62,8 @@ static lw_tables constants(void) {
         .closure_point = lw_fmu_closure_point, .closure_rotation = lw_fmu_closure_rotation,
         .closure_length = lw_fmu_closure_length, .force_type = lw_fmu_force_type,
         .force_body = lw_fmu_force_body, .force_point = lw_fmu_force_point,
+        .instructions = lw_fmu_instructions, .constants = lw_fmu_constants, .force_start = lw_fmu_force_start,
+        .force_code = lw_fmu_force_code, .force_constants = lw_fmu_force_constants,
         .events = lw_fmu_events, .event_joint = lw_fmu_event_joint, .event_action = lw_fmu_event_action,
         .event_occasion = lw_fmu_event_occasion, .event_side = lw_fmu_event_side,
         .event_threshold = lw_fmu_event_threshold, .event_restitution = lw_fmu_event_restitution};
@@ -71,7 +73,7 @@ static lw_tables constants(void) {
 size_t lw_part_size(void) {
     lw_tables tables = constants();
     size_t doubles = lw_state_size() + 1 + (size_t)lw_fmu_events + (MAX_ORDER + 1 + 3) * forces() + (size_t)lw_fmu_nv;
-    doubles += 6 * (size_t)lw_fmu_closures;
+    doubles += 6 * (size_t)lw_fmu_closures + 2 * (size_t)lw_fmu_forces;
     return (sizeof(lw_part) + 7) / 8 * 8 + doubles * sizeof(double) + (lw_multibody_size(&tables) + 7) / 8 * 8;
 }
 
@@ -90,6 +92,8 @@ void lw_part_create(lw_instance *instance) {
     part->out.total_wrench = next, next += forces();
     part->out.joint_acceleration = next, next += lw_fmu_nv;
     part->out.closure_reaction = next, next += 6 * lw_fmu_closures;
+    part->out.effort = next, next += lw_fmu_forces;
+    part->out.power = next, next += lw_fmu_forces;
     part->multibody = (lw_multibody *)(void *)next;
 }
 
@@ -167,6 +171,7 @@ static int discard(const lw_instance *instance, int status, const lw_fault *faul
     const char *expected = "numbers that stay finite", *was = "an overflow";
     if (status == LW_SINGULAR) expected = "a joint with inertia to move", was = "a massless body";
     if (status == LW_OPEN) expected = "loops that stay closed", was = "one that does not reach";
+    if (status == LW_FORCE_NOT_FINITE) expected = "an expression that gives numbers", was = "one that does not";
     if (status == LW_POINTS_MEET) expected = "points apart", was = "two that coincide";
     if (status == LW_STEP_UNDERFLOW) expected = "a substep that meets the tolerance", was = "none";
     return lw_report(instance, LW_FMI_DISCARD, "Expected %s but was %s at body, loop or force %d, %.9g s into the step.",
@@ -260,12 +265,15 @@ static int update_acceleration(lw_instance *instance) {
     lw_part *part = instance->part;
     lw_fault fault;
     pack_wrench(instance, 0.0, part->wrench);
-    int status = lw_multibody_evaluate(part->multibody, part->state, part->wrench, find_added(instance),
+    int status = lw_multibody_evaluate(part->multibody, part->state, instance->time, part->wrench,
+                                       find_added(instance),
                                        &part->out, &fault);
     if (status) return discard(instance, status, &fault);
     memcpy(AT(DER_V), part->out.joint_acceleration, (size_t)lw_fmu_nv * sizeof(double));
     split(lw_fmu_n, part->out.acceleration, AT(LINEAR_ACCELERATION), AT(ANGULAR_ACCELERATION));
     split(lw_fmu_n, part->out.reaction, AT(REACTION_FORCE), AT(REACTION_TORQUE));
+    memcpy(AT(FORCE_EFFORT), part->out.effort, (size_t)lw_fmu_forces * sizeof(double));
+    memcpy(AT(FORCE_POWER), part->out.power, (size_t)lw_fmu_forces * sizeof(double));
     split(lw_fmu_closures, part->out.closure_reaction, AT(CLOSURE_FORCE), AT(CLOSURE_TORQUE));
     return LW_FMI_OK;
 }
@@ -285,16 +293,19 @@ static int update_events(lw_instance *instance) {
 int lw_part_update(lw_instance *instance, unsigned groups) {
     lw_part *part = instance->part;
     lw_multibody *mb = part->multibody;
+    lw_fault fault;
+    int status = LW_FMI_OK;
     load_state(instance);
+    /* What motions prescribe is no matter of the importer's integrator. */
+    if (instance->kind == LW_MODEL_EXCHANGE)
+        status = lw_multibody_prescribe(mb, part->state, instance->time, &fault);
+    if (status) return discard(instance, status, &fault);
     if (groups & RATE) {
         memset(AT(DER_Q), 0, (size_t)lw_fmu_nq * sizeof(double)); /* room that no joint uses */
         lw_modes(mb, part->state + lw_state_size() + 1);
         lw_coordinate_rate(mb, part->state, part->state + lw_fmu_nq, AT(DER_Q));
     }
-    if (groups & EVENTS) {
-        int status = update_events(instance);
-        if (status) return status;
-    }
+    if (groups & EVENTS && (status = update_events(instance))) return status;
     if (groups & ENERGY) lw_multibody_energy(mb, part->state, AT(KINETIC_ENERGY), AT(POTENTIAL_ENERGY));
     if (groups & MOTION)
         lw_multibody_motion(mb, part->state, AT(POSITION), AT(ORIENTATION), AT(LINEAR), AT(ANGULAR));

@@ -40,6 +40,8 @@ static lw_multibody *build(void) {
         .closure_point = lw_fmu_closure_point, .closure_rotation = lw_fmu_closure_rotation,
         .closure_length = lw_fmu_closure_length, .force_type = lw_fmu_force_type,
         .force_body = lw_fmu_force_body, .force_point = lw_fmu_force_point,
+        .instructions = lw_fmu_instructions, .constants = lw_fmu_constants, .force_start = lw_fmu_force_start,
+        .force_code = lw_fmu_force_code, .force_constants = lw_fmu_force_constants,
         .force_number = lw_fmu_forces ? start(LW_DYNAMICS_FORCE_NUMBER) : 0, .events = 0};
     lw_multibody *memory = malloc(lw_multibody_size(&tables));
     if (lw_multibody_init(memory, &tables, &fault)) abort();

@@ -99,6 +99,31 @@ parent_point = [1.0, 1.0, 1.0]
 child_point = [0.1, 0.0, 0.0]
 stiffness = 3.0
 rest = 0.5
+force = { table = [[0.0, -1.0], [1.0, 0.0], [2.0, 3.0]], interpolation = "cubic" }
+[[forces]]
+name = "motor"
+type = "actuator"
+joint = "rail"
+force = "0.5*sin(9*t) - 0.1*q*v"
+[[forces]]
+name = "beat"
+type = "motion"
+joint = "flap"
+position = "0.4*sin(12*t)"
+[[forces]]
+name = "jet"
+type = "point_force"
+body = "lid"
+point = [0.02, 0.0, 0.01]
+frame = "body"
+fx = "0.3*cos(5*t) - 0.1*vz"
+ty = "0.01*theta"
+[[forces]]
+name = "float"
+type = "buoyancy"
+body = "sledge"
+point = [0.0, 0.1, 0.0]
+volume = 0.3
 [aero]
 model = "field"
 [aero.field.hub]

@@ -45,7 +45,7 @@ INPUTS = {
 }
 INTEGERS = (
     "closure_body", "closure_rows", "event_joint", "event_action", "event_occasion", "event_side",
-    "force_type", "force_body",
+    "force_type", "force_body", "force_start", "force_code",
 )  # fmt: skip
 FIXED = {"PARENT_POINT", "CHILD_POINT"}
 
@@ -140,6 +140,8 @@ def dynamics(tables: Tables, q0, v0, *, integrator=2, substeps=1, scalar=False, 
         "CLOSURE_TORQUE": 3 * closures,
         "EVENT_TIME": events,
         "EVENT_INDICATOR": events,
+        "FORCE_EFFORT": forces,
+        "FORCE_POWER": forces,
         "KINETIC_ENERGY": 1,
         "POTENTIAL_ENERGY": 1,
     }
@@ -148,11 +150,13 @@ def dynamics(tables: Tables, q0, v0, *, integrator=2, substeps=1, scalar=False, 
     constants = f"const int32_t lw_fmu_n = {n}, lw_fmu_nq = {nq}, lw_fmu_nv = {nv};\n"
     constants += f"const int32_t lw_fmu_closures = {closures}, lw_fmu_forces = {forces};\n"
     constants += f"const int32_t lw_fmu_events = {events};\n"
+    constants += f"const int32_t lw_fmu_instructions = {len(tables.force_code)};\n"
+    constants += f"const int32_t lw_fmu_constants = {len(tables.force_constants)};\n"
     for name in ("parent", "order", "joint_type", "q_index", "v_index", *INTEGERS):
         constants += _array("int32_t", name, getattr(tables, name))
     for name in (
         "parent_rotation", "child_rotation", "closure_point", "closure_rotation", "closure_length",
-        "event_threshold", "event_restitution", "force_point",
+        "event_threshold", "event_restitution", "force_point", "force_constants",
     ):  # fmt: skip
         constants += _array("double", name, getattr(tables, name))
     integers = {"INTEGRATOR": integrator, "SUBSTEPS": substeps}

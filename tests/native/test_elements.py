@@ -23,6 +23,7 @@ def springs(flat, *elements):
         force_body=np.array(bodies, np.int32),
         force_point=np.array(points, float),
         force_number=np.array(numbers, float),
+        force_start=np.zeros(len(elements) + 1, np.int32),
     )
 
 
@@ -140,10 +141,11 @@ def test_points_that_meet_have_no_direction():
     ("field", "value", "message"),
     [
         ("force_type", [9], r"force_type\[0\]: expected one of 0 \(spring\)"),
-        ("force_body", [(0, 0)], r"force_body\[0\]: expected two different bodies"),
-        ("force_body", [(0, 3)], r"force_body\[0\]: expected two different bodies"),
+        ("force_body", [(0, 0)], r"force_body\[0\]: expected a body that is there, of a spring two"),
+        ("force_body", [(0, 3)], r"force_body\[0\]: expected a body that is there, of a spring two"),
         ("force_point", [np.full((2, 3), np.nan)], r"force_point\[0\]: expected finite numbers"),
         ("force_number", [(np.inf, 0, 0)], r"force_number\[0\]: expected finite numbers"),
+        ("force_start", [0, 2], r"force_start\[0\]: expected an instruction"),
         ("force_number", [(0.0, 0)], r"force_number: expected shape \(1, 3\)"),
     ],
 )

@@ -135,6 +135,8 @@ def planar(steps=1200, **changes) -> Run:
         joint_gap=np.abs(random.normal(0, 2e-16, k)),
         closure_reaction=np.zeros((k, 0, 6)),
         event_time=np.zeros((k, 0)),
+        force_effort=np.zeros((k, 0)),
+        force_power=np.zeros((k, 0)),
     )
     errors = 10.0 ** random.normal([0, -1, -2, -2.5], 0.4, (k, 4))
     return run_of(scenario(**changes), path, errors)
@@ -224,5 +226,7 @@ def flapper(steps=800) -> Run:
         joint_gap=np.full(k, 1e-16),
         closure_reaction=np.zeros((k, 0, 6)),
         event_time=np.zeros((k, 0)),
+        force_effort=np.zeros((k, 0)),
+        force_power=np.zeros((k, 0)),
     )
     return run_of(description, path, np.full((k, 4), np.nan))

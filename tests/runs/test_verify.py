@@ -114,6 +114,8 @@ def test_fields_above_are_all_fields(log: Path) -> None:
             "diagnostics",
             "closure_reaction",
             "event_time",
+            "force_effort",
+            "force_power",
         }
         assert columns <= set(fields)
         assert set(fields) - columns <= {"run", "provider", "kind"}

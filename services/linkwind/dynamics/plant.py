@@ -22,7 +22,7 @@ class State(NamedTuple):
     Attributes:
         step: index of the communication point.
         values: coordinates, velocities, the integrator's memory and times of events, shape (state_size,).
-        external_work: done by the fluid since t_0 [J].
+        external_work: done by the fluid and by force elements without a potential since t_0 [J].
         dissipated_work: taken by joint dampers since t_0 [J].
     """
 

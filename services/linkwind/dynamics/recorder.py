@@ -53,7 +53,12 @@ class Recorder:
         self._events = len(mechanism.events)
         self._step_ns = scenario.coupling.step_ns
         self._state = StateEncoder(
-            n, len(mechanism.q0), len(mechanism.v0), len(mechanism.closures), len(mechanism.events)
+            n,
+            len(mechanism.q0),
+            len(mechanism.v0),
+            len(mechanism.closures),
+            len(mechanism.events),
+            len(mechanism.forces),
         )
         self._step = StepEncoder(scenario.coupling.order)
         self._accepted, self._accepted_twist = _motion_and_twist(n)
@@ -69,7 +74,7 @@ class Recorder:
         multibody, values = self.multibody, point.state.values
         time_ns = point.step * self._step_ns
         multibody.motion(values, self._accepted)
-        result = multibody.evaluate(values, point.wrench, point.added_inertia)
+        result = multibody.evaluate(values, point.wrench, point.added_inertia, time=time_ns / 1e9)
         kinetic, potential = multibody.energy(values)
         gap = multibody.joint_gap(self._accepted)
         q, v = multibody.coordinates(values)
@@ -88,6 +93,8 @@ class Recorder:
             dissipated_work=point.state.dissipated_work,
             joint_gap=gap,
             closure_reaction=result.closure_reaction,
+            force_effort=result.effort,
+            force_power=result.power,
             event_time=values[len(values) - self._events :],
         )
         self.log.state(payload, time_ns)

@@ -51,8 +51,7 @@ def _monotone(width: Array, slope: Array, *, periodic: bool) -> Array:
 
 
 def _mean(before: Array, after: Array, left: Array, right: Array) -> Array:
-    first, second = 2.0 * after + before, after + 2.0 * before
-    same = left * right > 0.0
-    product = np.where(same, left * right, 1.0)
-    mean: Array = np.where(same, (first + second) * product / (first * right + second * left), 0.0)
+    mean, same = np.zeros(len(left)), left * right > 0.0
+    first, second = (2.0 * after + before)[same], (after + 2.0 * before)[same]
+    mean[same] = (first + second) / (first / left[same] + second / right[same])
     return mean

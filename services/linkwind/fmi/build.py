@@ -21,7 +21,7 @@ _AT_ONCE = 2  # compilers
 _OPTIONAL = {
     "closures": ("lw_closures.c", "lw_delassus.c", "lw_projection.c"),
     "events": ("lw_events.c", "lw_impulse.c"),
-    "forces": ("lw_elements.c", "lw_expression.c", "lw_expression.h"),
+    "forces": ("lw_elements.c", "lw_expression.c"),
 }
 
 

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from linkwind.fmi import units
-from linkwind.fmi.coordinates import Piece, force_names, joint_names, pieces
+from linkwind.fmi.coordinates import Piece, joint_names, pieces
+from linkwind.fmi.elements import Elements
 from linkwind.fmi.structure import Dependences, Structure, is_stated
 from linkwind.fmi.units import Quantity
 from linkwind.fmi.variables import Dependence, Variability, Variable
@@ -39,11 +40,12 @@ def variables(scenario: Scenario, mechanism: Mechanism) -> list[Variable]:
         *_reactions(mechanism, structure),
         *_closures(mechanism, structure),
         *_events(mechanism, structure),
+        *_efforts(structure),
         *_energies(structure),
         *_derivatives(mechanism, structure),
         *_body_parameters(mechanism),
         *_joint_parameters(mechanism),
-        *_force_parameters(mechanism),
+        *_element_parameters(mechanism, structure.elements),
         *_solver(scenario),
     ]
 
@@ -198,6 +200,19 @@ def _events(mechanism: Mechanism, structure: Structure) -> Iterator[Variable]:
         )  # fmt: skip
 
 
+def _efforts(structure: Structure) -> Iterator[Variable]:
+    elements = structure.elements
+    about = {"spring": "Tension", "actuator": "Force or torque", "motion": "Force or torque that it takes"}
+    for i, name in enumerate(elements.names):
+        depends, initially = structure.acceleration(elements.bodies[i]), structure.inertia(elements.bodies[i])
+        effort = f"{about.get(elements.types[i], 'Size of the force')} of {name}"
+        yield output(
+            f"{name}.effort", "FORCE_EFFORT", i, (), elements.quantity(i), effort, depends, initially
+        )
+        power = f"Power that {name} gives to the bodies"
+        yield output(f"{name}.power", "FORCE_POWER", i, (), units.POWER, power, depends, initially)
+
+
 def _energies(structure: Structure) -> Iterator[Variable]:
     yield output(
         "kinetic_energy", "KINETIC_ENERGY", 0, (), units.ENERGY, "Kinetic energy of all bodies",
@@ -205,7 +220,7 @@ def _energies(structure: Structure) -> Iterator[Variable]:
     )  # fmt: skip
     yield output(
         "potential_energy", "POTENTIAL_ENERGY", 0, (), units.ENERGY,
-        "Potential energy: gravity, from the origin of W, and springs",
+        "Potential energy: gravity, from the origin of W, springs, buoyancy",
         structure.potential_energy(), structure.stored(),
     )  # fmt: skip
 
@@ -217,7 +232,7 @@ def _derivatives(mechanism: Mechanism, structure: Structure) -> Iterator[Variabl
             if piece.quaternion:
                 rate: Dependences = (Dependence(q), Dependence(v))
             else:
-                rate = (Dependence(v, "constant", elementwise=True),)
+                rate = (Dependence(v, "constant", elementwise=True), *structure.moved([i]))
             for what, state, first, count, depends, initially in (
                 ("q", q, piece.q, piece.nq, rate, ()),
                 ("v", v, piece.v, piece.nv, structure.acceleration(i), structure.inertia(i)),
@@ -271,16 +286,10 @@ def _springs(piece: Piece, mechanism: Mechanism) -> Iterator[Variable]:
         )  # fmt: skip
 
 
-def _force_parameters(mechanism: Mechanism) -> Iterator[Variable]:
-    numbers = (
-        ("stiffness", units.STIFFNESS, "Stiffness"),
-        ("damping", units.DAMPING, "Damping"),
-        ("rest", units.LENGTH, "Length without tension"),
-    )
-    for i, name in enumerate(force_names(mechanism)):
-        for k, (what, quantity, about) in enumerate(numbers):
-            value = float(mechanism.tables.force_number[i, k])
-            at = 3 * i + k
+def _element_parameters(mechanism: Mechanism, elements: Elements) -> Iterator[Variable]:
+    for i, name in enumerate(elements.names):
+        for k, (what, quantity, about) in enumerate(elements.parameters(i)):
+            value, at = float(mechanism.tables.force_number[i, k]), 3 * i + k
             yield parameter(f"{name}.{what}", "FORCE_NUMBER", at, value, quantity, f"{about} of {name}")
 
 

@@ -26,7 +26,8 @@ def dynamics_sections(n: int, nq: int, nv: int, closures: int, forces: int, even
         "DER_Q": nq, "DER_V": nv, "POSITION": 3 * n, "ORIENTATION": 4 * n, "LINEAR": 3 * n, "ANGULAR": 3 * n,
         "LINEAR_ACCELERATION": 3 * n, "ANGULAR_ACCELERATION": 3 * n, "REACTION_FORCE": 3 * n,
         "REACTION_TORQUE": 3 * n, "CLOSURE_FORCE": 3 * closures, "CLOSURE_TORQUE": 3 * closures,
-        "EVENT_TIME": events, "EVENT_INDICATOR": events, "KINETIC_ENERGY": 1, "POTENTIAL_ENERGY": 1,
+        "EVENT_TIME": events, "EVENT_INDICATOR": events, "FORCE_EFFORT": forces, "FORCE_POWER": forces,
+        "KINETIC_ENERGY": 1, "POTENTIAL_ENERGY": 1,
     }  # fmt: skip
     return known | calculated
 

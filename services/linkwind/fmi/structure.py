@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from linkwind.fmi.coordinates import Piece, force_names, joint_names, pieces
+from linkwind.fmi.coordinates import Piece, joint_names, pieces
+from linkwind.fmi.elements import Elements
 from linkwind.fmi.variables import Dependence, Kind
 from linkwind.mechanism import Mechanism
 
@@ -21,9 +22,8 @@ class Structure:
         self._stated = [is_stated(joint) for joint in mechanism.joints]
         self._pieces = pieces(mechanism)
         self._path = [_path(i, parents) for i in range(len(parents))]
-        self._forces = force_names(mechanism)
-        self._root = roots = _groups(mechanism, [path[0] for path in self._path])
-        self._pulls = [int(bodies.max()) for bodies in mechanism.tables.force_body]  # one of the bodies
+        self.elements = Elements(mechanism)
+        self._root = roots = _groups(mechanism, self.elements, [path[0] for path in self._path])
         self._accelerations = {root: self._acceleration(self._tree(root)) for root in set(roots)}
         self._inertias = {root: self._inertia(self._tree(root)) for root in set(roots)}
 
@@ -32,27 +32,29 @@ class Structure:
 
     def position(self, i: int) -> Dependences:
         """Of the centre of mass of body i."""
-        return tuple(
+        places = (
             Dependence(piece.called("q"), "dependent" if piece.turns else _kind(piece))
             for piece in self._on(i)
         )
+        return (*places, *self.moved(self._path[i]))
 
     def orientation(self, i: int) -> Dependences:
         """Of body i."""
-        return tuple(Dependence(piece.called("q")) for piece in self._on(i) if piece.turns)
+        turns = (Dependence(piece.called("q")) for piece in self._on(i) if piece.turns)
+        return (*turns, *self.moved(self._path[i]))
 
     def linear(self, i: int) -> Dependences:
         """Of the velocity of body i: lever arms do not depend on where the root is."""
         arms = [Dependence(p.called("q")) for p in self._on(i) if p.turns or not p.of_root]
         speeds = [Dependence(p.called("v"), "dependent" if p.turns else _kind(p)) for p in self._on(i)]
-        return (*arms, *speeds)
+        return (*arms, *speeds, *self.moved(self._path[i]))
 
     def angular(self, i: int) -> Dependences:
         """Of the angular velocity of body i: each joint turns about an axis that those before have turned."""
         turns = [piece for piece in self._on(i) if piece.turns]
         turned = [p for p in turns if p is not turns[-1] or p.quaternion]
         rates = [Dependence(p.called("v"), "dependent" if p.quaternion else _kind(p)) for p in turns]
-        return (*(Dependence(p.called("q")) for p in turned), *rates)
+        return (*(Dependence(p.called("q")) for p in turned), *rates, *self.moved(self._path[i]))
 
     def acceleration(self, i: int) -> Dependences:
         """Of accelerations and reactions of body i: on everything in its tree."""
@@ -63,7 +65,13 @@ class Structure:
         for k in tree:
             knowns += [piece.called(what) for piece in self._pieces[k] for what in ("q", "v")]
             knowns += [f"{self._bodies[k]}.{what}" for what in ("F", "T", "A")]
+        if self.elements.in_time(tree):
+            knowns.append("time")
         return tuple(map(Dependence, knowns))
+
+    def moved(self, bodies: list[int]) -> Dependences:
+        """Time, for what depends on the joints of some bodies, if a motion prescribes one of them."""
+        return (Dependence("time"),) if self.elements.moved & set(bodies) else ()
 
     def kinetic_energy(self) -> Dependences:
         """Of all bodies."""
@@ -71,11 +79,13 @@ class Structure:
         return (
             *(Dependence(piece.called("q")) for piece in every if piece.turns or not piece.of_root),
             *(Dependence(piece.called("v")) for piece in every),
+            *self.moved(list(range(len(self._bodies)))),
         )
 
     def potential_energy(self) -> Dependences:
         """Of all bodies and springs."""
-        return tuple(Dependence(piece.called("q")) for joint in self._pieces for piece in joint)
+        places = (Dependence(piece.called("q")) for joint in self._pieces for piece in joint)
+        return (*places, *self.moved(list(range(len(self._bodies)))))
 
     def geometry(self, i: int) -> Dependences:
         """Parameters that place the joints on the way to body i."""
@@ -91,10 +101,7 @@ class Structure:
         bodies = tuple(Dependence(f"{self._bodies[k]}.{what}") for k in tree for what in ("mass", "inertia"))
         points = self._parameters(stated, "parent_point", "child_point")
         springs = self._springs(stated, "stiffness", "damping", "rest")
-        pulls = [name for name, body in zip(self._forces, self._pulls, strict=True) if body in tree]
-        springs += tuple(
-            Dependence(f"{name}.{what}") for name in pulls for what in ("stiffness", "damping", "rest")
-        )
+        springs += tuple(map(Dependence, self.elements.parameter_names(tree)))
         return (Dependence("gravity"), *bodies, *points, *springs)
 
     def stored(self) -> Dependences:
@@ -103,9 +110,8 @@ class Structure:
         masses = tuple(Dependence(f"{body}.mass") for body in self._bodies)
         points = self._parameters(stated, "parent_point", "child_point")
         springs = self._springs(stated, "stiffness", "rest")
-        springs += tuple(
-            Dependence(f"{name}.{what}") for name in self._forces for what in ("stiffness", "rest")
-        )
+        every = list(range(len(self._bodies)))
+        springs += tuple(map(Dependence, self.elements.parameter_names(every, stored=True)))
         return (Dependence("gravity"), *masses, *points, *springs)
 
     def moving(self) -> Dependences:
@@ -126,10 +132,10 @@ class Structure:
         )
 
 
-def _groups(mechanism: Mechanism, roots: list[int]) -> list[int]:
+def _groups(mechanism: Mechanism, elements: Elements, roots: list[int]) -> list[int]:
     """Return for each body the same number as for those that it acts on, also by loops and elements."""
     group = list(roots)
-    for first, second in [*mechanism.tables.closure_body.tolist(), *mechanism.tables.force_body.tolist()]:
+    for first, second in [*mechanism.tables.closure_body.tolist(), *elements.pairs]:
         if first >= 0 and second >= 0:
             group = [group[second] if own == group[first] else own for own in group]
     return group

@@ -28,9 +28,10 @@ class StateEncoder:
         nv: number of joint velocities.
         closures: number of joints that close loops.
         events: number of things that may happen to joints.
+        forces: number of force elements.
     """
 
-    def __init__(self, n: int, nq: int, nv: int, closures: int = 0, events: int = 0) -> None:
+    def __init__(self, n: int, nq: int, nv: int, closures: int = 0, events: int = 0, forces: int = 0) -> None:
         six = [0.0] * (6 * n)
         motion = {"position": six[: 3 * n], "orientation": six[: 4 * n]}
         motion |= {"linear": six[: 3 * n], "angular": six[: 3 * n]}
@@ -39,7 +40,7 @@ class StateEncoder:
             MESSAGES["State"](
                 step=0, time_ns=0, motion=motion, q=[0.0] * nq, v=[0.0] * nv,
                 acceleration=six, reaction=six, wrench=six, closure_reaction=[0.0] * (6 * closures),
-                event_time=[0.0] * events,
+                event_time=[0.0] * events, force_effort=[0.0] * forces, force_power=[0.0] * forces,
                 **dict.fromkeys(scalars, 0.0),
             )
         )  # fmt: skip
@@ -55,6 +56,7 @@ class StateEncoder:
         self._wrench = views["wrench"].reshape(n, 6)
         self._closure_reaction = views["closure_reaction"].reshape(closures, 6)
         self._event_time = views["event_time"]
+        self._force_effort, self._force_power = views["force_effort"], views["force_power"]
         self._energies = self._layout.regions["kinetic_energy"].offset
 
     def encode(
@@ -75,6 +77,8 @@ class StateEncoder:
         joint_gap: float,
         closure_reaction: Array | None = None,
         event_time: Array | None = None,
+        force_effort: Array | None = None,
+        force_power: Array | None = None,
     ) -> bytes:
         """Return the State at one communication point.
 
@@ -90,11 +94,13 @@ class StateEncoder:
             wrench: total on each body, with the part of A [N, N·m], shape (n, 6), force first, in W.
             kinetic_energy: [J].
             potential_energy: of gravity and springs [J].
-            external_work: done by the fluid since t_0 [J].
+            external_work: done by the fluid and by force elements without a potential since t_0 [J].
             dissipated_work: taken by joint dampers since t_0 [J].
             joint_gap: largest distance of two joint points, from the poses [m].
             closure_reaction: of the joints that close loops, as ``reaction``, shape (closures, 6).
             event_time: when each event happened [s], -1 for not yet, shape (events,).
+            force_effort: of force elements [N or N·m], shape (forces,).
+            force_power: that they give to the bodies [W], shape (forces,).
         """
         self._step[0] = step
         self._time_ns[0] = time_ns
@@ -110,6 +116,8 @@ class StateEncoder:
             self._closure_reaction[...] = closure_reaction
         if event_time is not None:
             self._event_time[...] = event_time
+        if force_effort is not None and force_power is not None:
+            self._force_effort[...], self._force_power[...] = force_effort, force_power
         ENERGIES.pack_into(
             self._layout.buffer, self._energies, kinetic_energy,
             0x51, potential_energy, 0x59, external_work, 0x61, dissipated_work, 0x69, joint_gap,

@@ -39,12 +39,14 @@ class Trajectory(NamedTuple):
         wrench: total on each body, with the part of A [N, N·m], shape (k, n, 6), force first, in W.
         kinetic_energy: [J], shape (k,).
         potential_energy: of gravity and springs [J], shape (k,).
-        external_work: done by the fluid since t_0 [J], shape (k,).
+        external_work: done by the fluid and by force elements without a potential since t_0 [J], shape (k,).
         dissipated_work: taken by joint dampers since t_0 [J], shape (k,).
         joint_gap: largest distance of two joint points, from the poses [m], shape (k,).
         closure_reaction: of each of c joints that close loops, parent on child [N, N·m], shape (k, c, 6),
             force first, in W at the joint's point on the child.
         event_time: when each of e events had happened [s], -1 for not yet, shape (k, e).
+        force_effort: tension, force or torque of f force elements [N or N·m], shape (k, f).
+        force_power: that they give to the bodies [W], shape (k, f).
     """
 
     step: Index
@@ -65,6 +67,8 @@ class Trajectory(NamedTuple):
     joint_gap: Array
     closure_reaction: Array
     event_time: Array
+    force_effort: Array
+    force_power: Array
 
 
 class Steps(NamedTuple):
@@ -159,6 +163,8 @@ def trajectory(state: dict[str, NDArray[Any]]) -> Trajectory:
         **{field: state[field][:, 0] for field in scalars},
         closure_reaction=_sixes(state["closure_reaction"]),
         event_time=state["event_time"],
+        force_effort=state["force_effort"],
+        force_power=state["force_power"],
     )
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from linkwind.mechanism.assembly import assemble
 from linkwind.mechanism.events import happenings
-from linkwind.mechanism.forces import with_forces
+from linkwind.mechanism.forces import prescribed, with_forces
 from linkwind.mechanism.start import WORLD_START, JointStart, Start, start
 from linkwind.mechanism.tables import padded, room, tables
 from linkwind.mechanism.tree import WORLD, carriers, order
@@ -61,15 +61,17 @@ def build(scenario: Scenario) -> Mechanism:
     Raises:
         MechanismError: joints that leave the plane of a planar mechanism, springs that do not fit their
             joint, a body that starts in a way that its joint does not allow, a loop that does not close, an
-            event that cannot happen to its joint, a force element that does not fit, or a
-            start from which it is not settled how the mechanism moves.
+            event that cannot happen to its joint, a force element that does not fit, or a start from which
+            it is not settled how the mechanism moves.
     """
     carried, loops = carriers(scenario)
     bodies: dict[int, Start] = {WORLD: WORLD_START}
     joints: dict[int, JointStart] = {}
+    moved = prescribed(scenario)
     for i in order([carrier.parent for carrier in carried]):
         item = f"{scenario.source}: bodies[{i}]"
-        bodies[i], joints[i] = start(scenario.bodies[i], carried[i], bodies[carried[i].parent], item)
+        given = moved.get(carried[i].name, {})
+        bodies[i], joints[i] = start(scenario.bodies[i], carried[i], bodies[carried[i].parent], item, given)
     count = range(len(carried))
     starts = [joints[i] for i in count]
     happening = happenings(scenario, carried, loops)
@@ -78,14 +80,15 @@ def build(scenario: Scenario) -> Mechanism:
     q0 = padded([joint.q for joint in starts], roomy, NQ)
     v0 = padded([joint.v for joint in starts], roomy, NV)
     if loops:
-        q0, v0 = assemble(scenario, flat, loops, q0, v0)
+        moving = with_forces(flat, scenario, carried, q0, v0, motions=True)
+        q0, v0 = assemble(scenario, moving, loops, q0, v0)
     return Mechanism(
         bodies=tuple(body.name for body in scenario.bodies),
         joints=tuple(carrier.name for carrier in carried),
         closures=tuple(loop.joint.name for loop in loops),
         events=tuple(each.name for each in happening),
         forces=tuple(force.name for force in scenario.forces),
-        tables=with_forces(flat, scenario, q0, v0),
+        tables=with_forces(flat, scenario, carried, q0, v0),
         q0=q0,
         v0=v0,
         has_joints=bool(scenario.joints),

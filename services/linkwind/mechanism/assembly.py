@@ -9,7 +9,7 @@ import numpy as np
 
 from linkwind.errors import MechanismError, SimulationError
 from linkwind.mechanism.tree import Loop
-from linkwind.native.multibody import JOINT_TYPES, NQ, NV, QUATERNION_AT, Multibody, Tables
+from linkwind.native.multibody import FORCE_TYPES, JOINT_TYPES, NQ, NV, QUATERNION_AT, Multibody, Tables
 from linkwind.scenario import Body, Scenario
 from linkwind.spatial import Array
 
@@ -58,6 +58,8 @@ def _loose(tables: Tables, scenario: Scenario, stated: Callable[[Body], bool]) -
     for i, body in enumerate(scenario.bodies):
         width = _width(tables, i)
         loose[tables.v_index[i] : tables.v_index[i] + width] = not stated(body)
+    moved = tables.force_body[tables.force_type == FORCE_TYPES["motion"]]
+    loose[tables.v_index[moved[:, 0]] + moved[:, 1]] = False
     return loose
 
 

@@ -9,6 +9,7 @@ that keeps the angle between its bodies (fixed, prismatic) keeps the one that th
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -90,7 +91,11 @@ class _Frames:
 WORLD_START = Start(np.zeros(3), IDENTITY, 0.0, np.zeros(3), np.zeros(3))
 
 
-def start(body: Body, carrier: Carrier, parent: Start, item: str) -> tuple[Start, JointStart]:
+Given = Mapping[int, tuple[float, float]]
+"""Coordinates of a joint that motions prescribe, by number: value and rate at the start."""
+
+
+def start(body: Body, carrier: Carrier, parent: Start, item: str, given: Given) -> tuple[Start, JointStart]:
     """Return a body and its joint at the start.
 
     Args:
@@ -98,36 +103,45 @@ def start(body: Body, carrier: Carrier, parent: Start, item: str) -> tuple[Start
         carrier: the joint that carries the body.
         parent: the parent at the start.
         item: where the body stands in the scenario, for errors.
+        given: what motions say about the joint.
 
     Raises:
-        MechanismError: the body states something that its joint does not allow.
+        MechanismError: the body states something that its joint, or a motion of it, does not allow.
     """
+    slides, turns = np.array(SLIDES[carrier.type]), np.array(TURNS[carrier.type])
+    moved = {k: pair for k, pair in given.items() if k < slides.sum()}
+    turned = given.get(int(slides.sum()))
     orientation, angle = _orientation(body, parent)
     frames = _frames(carrier, parent, orientation)
     turn = _turn(carrier, parent, angle, frames, item)
-    if carrier.type in ("revolute", "planar") and angle is None:  # exactly about the axis
+    if turned is not None:
+        angle = _turned(body, carrier, parent, turn, turned[0], item)
+        turn = np.array([turned[0]])
+    if carrier.type in ("revolute", "planar") and (angle is None or turned):  # exactly about the axis
         child_frame = product(frames.parent_frame, about_z(turn[0]))
         frames = replace(frames, child_frame=child_frame)
         orientation = product(child_frame, inverse(frames.child_rotation))
     arm = rotate(orientation, carrier.child_point)
 
     anchor = parent.position + rotate(parent.orientation, carrier.parent_point)
-    slides = np.array(SLIDES[carrier.type])
     stated = anchor if body.position is None else np.array(body.position) + arm
     offset = np.where(slides, rotate(inverse(frames.parent_frame), stated - anchor), 0.0)
+    offset[np.flatnonzero(slides)[list(moved)]] = [value for value, _ in moved.values()]
     joint_point = anchor + rotate(frames.parent_frame, offset)
     position = joint_point - arm
     _agree(f"{item}.position", body.position, position, carrier, "m")
 
-    turns = np.array(TURNS[carrier.type])
     stated = parent.angular if body.angular_velocity is None else np.array(body.angular_velocity)
     rate = np.where(turns, rotate(inverse(frames.child_frame), stated - parent.angular), 0.0)
+    if turned is not None:
+        rate = np.array([0.0, 0.0, turned[1]])
     angular = parent.angular + rotate(frames.child_frame, rate)
     _agree(f"{item}.angular_velocity", body.angular_velocity, angular, carrier, "rad/s")
 
     carried = parent.linear + np.cross(parent.angular, joint_point - parent.position)
     stated = carried if body.velocity is None else np.array(body.velocity) + np.cross(angular, arm)
     speed = np.where(slides, rotate(inverse(frames.parent_frame), stated - carried), 0.0)
+    speed[np.flatnonzero(slides)[list(moved)]] = [rate for _, rate in moved.values()]
     linear = carried + rotate(frames.parent_frame, speed) - np.cross(angular, arm)
     _agree(f"{item}.velocity", body.velocity, linear, carrier, "m/s")
 
@@ -135,6 +149,23 @@ def start(body: Body, carrier: Carrier, parent: Start, item: str) -> tuple[Start
     v = np.concatenate([speed[slides], rate[turns]])
     joint = JointStart(q, v, frames.parent_rotation, frames.child_rotation)
     return Start(position, orientation, angle, linear, angular), joint
+
+
+def _turned(
+    body: Body, carrier: Carrier, parent: Start, turn: Array, angle: float, item: str
+) -> float | None:
+    """Return a body's angle from that of its joint; None where it is no turn about z."""
+    stated = body.angle_deg is not None or body.orientation is not None
+    if stated and abs(math.remainder(turn[0] - angle, 2.0 * math.pi)) > TURN_TOLERANCE:
+        raise MechanismError(
+            f"{item}: expected an orientation at which {carrier.name} stands at "
+            f"{math.degrees(angle):.9g}°, as its motion says; got one at {math.degrees(turn[0]):.9g}°. "
+            "Leave it out."
+        )
+    x, y, z = carrier.axis
+    if parent.angle is None or x or y:
+        return None
+    return parent.angle + math.copysign(1.0, z) * angle
 
 
 def _orientation(body: Body, parent: Start) -> tuple[Array, float | None]:

@@ -14,7 +14,15 @@ import numpy as np
 
 from linkwind.errors import MechanismError
 from linkwind.native.library import declare
-from linkwind.native.multibody import ACTIONS, JOINT_TYPES, OCCASIONS, Evaluation, Multibody, Tables
+from linkwind.native.multibody import (
+    ACTIONS,
+    FORCE_TYPES,
+    JOINT_TYPES,
+    OCCASIONS,
+    Evaluation,
+    Multibody,
+    Tables,
+)
 from linkwind.spatial import Array, Motion, address
 
 _pointer = ctypes.c_void_p
@@ -66,10 +74,12 @@ class Cfe(Multibody):
             time: in which Baumgarte's method undoes what a joint is open [s]: it goes back as exp(-t/time).
 
         Raises:
-            MechanismError: a table has a wrong shape or a wrong value, or an event is no release.
+            MechanismError: a table has a wrong shape or a wrong value, a motion is prescribed, or an event is
+                no release.
         """
         self.tree = Multibody(tables, bodies, closures, events, forces)
         _check_events(self.tree)
+        _check_motions(self.tree)
         super().__init__(_free(tables))
         self._names = self.tree._names
         self._joints = np.zeros((_size(self.tree._model) + 7) // 8)
@@ -89,9 +99,11 @@ class Cfe(Multibody):
         _coordinates(self._model, self._state_at, address(q), address(v))
         return q, v
 
-    def evaluate(self, state: Array, wrench: Array, added_inertia: Array | None = None) -> Evaluation:
+    def evaluate(
+        self, state: Array, wrench: Array, added_inertia: Array | None = None, *, time: float = 0.0
+    ) -> Evaluation:
         """Return accelerations and forces, see ``Multibody``; joint accelerations are the bodies' own."""
-        result = super().evaluate(state, wrench, added_inertia)
+        result = super().evaluate(state, wrench, added_inertia, time=time)
         reaction = np.zeros((self.tree.closures, 6))
         _closure_reactions(self._model, address(reaction))
         return result._replace(closure_reaction=reaction)
@@ -106,6 +118,14 @@ def _check_events(tree: Multibody) -> None:
         raise MechanismError(
             f"event {tree._names.events[i]}: expected a release, which is all that method cfe knows; got "
             "a lock or a stop. Use reduced."
+        )
+
+
+def _check_motions(tree: Multibody) -> None:
+    for i in map(int, np.flatnonzero(tree.tables.force_type == FORCE_TYPES["motion"])):
+        raise MechanismError(
+            f"force {tree._names.forces[i]}: expected a spring, an actuator, a point force or buoyancy, "
+            "which is what method cfe knows; got a motion. Use reduced."
         )
 
 
@@ -143,4 +163,7 @@ def _free(tables: Tables) -> Tables:
         force_body=tables.force_body,
         force_point=tables.force_point,
         force_number=tables.force_number,
+        force_start=tables.force_start,
+        force_code=tables.force_code,
+        force_constants=tables.force_constants,
     )

@@ -42,11 +42,13 @@ _NUMERICS = {
     10: ("joint {item}", "bodies that close the loop", "a position from which they do not reach",
         "Check points, lengths and the start; a smaller step may help"),
     11: ("event {item}", "a few times within a step", "a thousand", "Give its stop a smaller restitution"),
+    13: ("force {item}", "a finite number", "NaN or infinity",
+        "Does its expression divide by zero, or leave a function's domain?"),
     14: ("force {item}", "two points apart", "points that coincide, so that it has no direction",
         "Move one of the points; a smaller step may help"),
 }  # fmt: skip
 _UNNAMED = (3, 6)  # the item is no body
-_KINDS = {10: 1, 11: 2, 14: 3}  # it is a joint that closes a loop, an event, or a force element
+_KINDS = {10: 1, 11: 2, 13: 3, 14: 3}  # it is a joint that closes a loop, an event, or a force element
 _ARGUMENTS = {
     20: ("h", "a positive macro step [s]"),
     21: ("nodes", "1 to 8 distinct finite nodes"),

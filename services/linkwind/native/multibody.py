@@ -29,6 +29,7 @@ from linkwind.native.tables import (
     CTables,
     Tables,
     contiguous,
+    counts,
     refuse,
 )
 from linkwind.spatial import Array, Motion, address
@@ -62,7 +63,8 @@ _affine_size = declare("lw_affine_size", [_int], ctypes.c_size_t)
 _affine_inertia = declare("lw_affine_inertia", [_pointer] * 4 + [_double, _pointer], None)
 _advance_affine = declare("lw_multibody_advance_affine", [_pointer] * 3)
 _motion = declare("lw_multibody_motion", [_pointer] * 6, None)
-_evaluate = declare("lw_multibody_evaluate", [_pointer] * 6)
+_evaluate = declare("lw_multibody_evaluate", [_pointer, _pointer, _double] + [_pointer] * 4)
+_prescribe = declare("lw_multibody_prescribe", [_pointer, _pointer, _double, _pointer])
 _row_count = declare("lw_closure_row_count", [_pointer], _int)
 _closures = declare("lw_multibody_closures", [_pointer] * 4, None)
 _close = declare("lw_multibody_close", [_pointer] * 3)
@@ -74,7 +76,7 @@ NOT_YET, ORDERED = -1.0, -2.0  # in a state: an event that has not happened; one
 KNOWN_ARRAYS = 32  # whose addresses are remembered
 _macro_step = struct.Struct("@PddPPPddiiiPPP")
 _affine = struct.Struct("@PPPPPP")
-_evaluation = struct.Struct("@PPPPP")
+_evaluation = struct.Struct("@7P")
 
 
 class Multibody:
@@ -118,15 +120,13 @@ class Multibody:
         """
         arrays = contiguous(tables)
         self.tables = tables
-        self.n, self.nq, self.nv = len(tables.parent), len(tables.rest), len(tables.stiffness)
-        self.closures, self.events = len(tables.closure_rows), len(tables.event_joint)
-        self.forces = len(tables.force_type)
+        many = counts(tables)
+        self.n, self.nq, self.nv, self.closures, self.events, self.forces = list(many.values())[:6]
         named = (bodies, self.n), (closures, self.closures), (events, self.events), (forces, self.forces)
         self._names = Names(*(_quoted(names, count) for names, count in named))
         self.state_size = self.nq + self.nv + 1 + self.events
         pointers = {name: array.ctypes.data for name, array in arrays.items()}
-        counts = {name: getattr(self, name) for name in ("n", "nq", "nv", "closures", "events", "forces")}
-        native = CTables(**counts, **pointers)
+        native = CTables(**many, **pointers)
         self.rows = _row_count(ctypes.addressof(native))
         self._memory = np.zeros((_size(ctypes.addressof(native)) + 7) // 8)
         self._state, self._next = np.zeros(self.state_size), np.zeros(self.state_size)
@@ -144,9 +144,10 @@ class Multibody:
             refuse(tables, status, self._fault.item)
 
     def _evaluation_of(self) -> tuple[Array, ctypes.Array[ctypes.c_char]]:
-        """Return room for joint accelerations, three rows of six a body and one a closure; and its struct."""
-        results = np.zeros(self.nv + 18 * self.n + 6 * self.closures)
-        starts = np.cumsum([0, self.nv, 6 * self.n, 6 * self.n, 6 * self.n])
+        """Return room for what ``Evaluation`` has, in the order of the struct; and that."""
+        sizes = [self.nv, 6 * self.n, 6 * self.n, 6 * self.n, self.forces, self.forces, 6 * self.closures]
+        results, starts = np.zeros(sum(sizes)), np.cumsum([0, *sizes[:-1]])
+        self._pieces = starts[1:]
         struct = ctypes.create_string_buffer(_evaluation.size)
         _evaluation.pack_into(struct, 0, *(address(results) + 8 * int(start) for start in starts))
         return results, struct
@@ -307,8 +308,10 @@ class Multibody:
             raise ValueError(f"out: expected a Motion of {self.n} bodies; got {len(out)}. One per body.")
         _motion(self._model, self._state_at, *out.addresses)
 
-    def evaluate(self, state: Array, wrench: Array, added_inertia: Array | None = None) -> Evaluation:
-        """Return accelerations, reactions and the whole wrench under a wrench, shape (n, 6), in W.
+    def evaluate(
+        self, state: Array, wrench: Array, added_inertia: Array | None = None, *, time: float = 0.0
+    ) -> Evaluation:
+        """Return accelerations and forces under a wrench, shape (n, 6), in W, at a time [s].
 
         Raises:
             SimulationError: singular inertia, NaN or infinity.
@@ -318,15 +321,25 @@ class Multibody:
         if wrench.shape != (self.n, 6):
             self._refuse("wrench", (self.n, 6), wrench)
         status = _evaluate(
-            self._model, self._state_at, self._locate(wrench), self._locate_added(added_inertia),
+            self._model, self._state_at, time, self._locate(wrench), self._locate_added(added_inertia),
             ctypes.addressof(self._evaluation), self._fault_at,
         )  # fmt: skip
         if status:
             fail(status, self._fault, self._names, {})
-        result, nv = self._results.copy(), self.nv
-        sixes = result[nv:].reshape(-1, 6)
-        bodies = sixes[: 3 * self.n].reshape(3, self.n, 6)
-        return Evaluation(result[:nv], bodies[0], bodies[1], bodies[2], sixes[3 * self.n :])
+        turn, *sixes, effort, power, closures = np.split(self._results.copy(), self._pieces)
+        acceleration, reaction, total = (each.reshape(-1, 6) for each in sixes)
+        return Evaluation(turn, acceleration, reaction, total, effort, power, closures.reshape(-1, 6))
+
+    def prescribe(self, state: Array, time: float) -> Array:
+        """Return a state with what motions prescribe as it is at a time [s].
+
+        Raises:
+            SimulationError: a motion gives no number.
+        """
+        self._take(state)
+        if status := _prescribe(self._model, self._state_at, time, self._fault_at):
+            fail(status, self._fault, self._names, {})
+        return self._state.copy()
 
     def violations(self, state: Array) -> tuple[Array, Array]:
         """Return by how much each equation of the closures is violated, and how that depends on the motion.

@@ -41,6 +41,9 @@ class Evaluation(NamedTuple):
         reaction: of the parent on the child through the joint, springs and dampers included, force first
             [N, N·m], shape (n, 6), in W at the joint's point on the child.
         total_wrench: wrench - A a [N, N·m], shape (n, 6), force first, in W at the centres of mass.
+        effort: of force elements: tension of a spring [N], force or torque of an actuator or motion [N or
+            N·m], size of the force of others [N], shape (f,).
+        power: that they give to the bodies [W], shape (f,).
         closure_reaction: of the first on the second body of each joint that closes a loop [N, N·m], shape
             (c, 6), force first, in W at the joint's point on the second.
     """
@@ -49,4 +52,6 @@ class Evaluation(NamedTuple):
     acceleration: Array
     reaction: Array
     total_wrench: Array
+    effort: Array
+    power: Array
     closure_reaction: Array

@@ -35,7 +35,7 @@ OCCASIONS: dict[str, int] = {
     "distance": 6,
 }
 KEEP_TRANSLATION, KEEP_ROTATION, DISTANCE = (1, 2, 4), (8, 16, 32), 64  # bits of closure_rows
-FORCE_TYPES: dict[str, int] = {"spring": 0}
+FORCE_TYPES: dict[str, int] = {"spring": 0, "actuator": 1, "motion": 2, "point_force": 3, "buoyancy": 4}
 QUATERNION_AT = {JOINT_TYPES["spherical"]: 0, JOINT_TYPES["free"]: 3}
 
 
@@ -73,9 +73,13 @@ class Tables:
         event_threshold: [s, N, N·m, rad, m or per second], shape (e,).
         event_restitution: of a stop, 0 to 1, shape (e,).
         force_type: codes of ``FORCE_TYPES`` of f force elements, int32, shape (f,).
-        force_body: the two bodies of each, -1 for the world, int32, shape (f, 2).
+        force_body: the two bodies of a spring, -1 for the world; of others the body (of an actuator or a
+            motion the one that the joint carries, and the number of the coordinate), int32, shape (f, 2).
         force_point: its points on both bodies, body frame, from the centre of mass [m], shape (f, 2, 3).
-        force_number: stiffness [N/m], damping [N·s/m], length without tension [m], shape (f, 3).
+        force_number: stiffness [N/m], damping [N·s/m], length without tension [m] of a spring; whether a
+            point force is in the body frame; volume [m³], density [kg/m³], shape (f, 3).
+        force_start, force_code, force_constants: programs as in ``FieldTable``, maybe empty, shapes (f + 1,),
+            (instructions, 2), (any,); their variables and results are those of ``lw_force_type``.
     """
 
     parent: Index
@@ -108,12 +112,18 @@ class Tables:
     force_body: Index = field(default_factory=lambda: np.zeros((0, 2), np.int32))
     force_point: Array = field(default_factory=lambda: np.zeros((0, 2, 3)))
     force_number: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    force_start: Index = field(default_factory=lambda: np.zeros(1, np.int32))
+    force_code: Index = field(default_factory=lambda: np.zeros((0, 2), np.int32))
+    force_constants: Array = field(default_factory=lambda: np.zeros(0))
+
+
+COUNTS = ("n", "nq", "nv", "closures", "events", "forces", "instructions", "constants")
 
 
 class CTables(ctypes.Structure):
     """``lw_tables`` of the library."""
 
-    _fields_ = [(name, ctypes.c_int32) for name in ("n", "nq", "nv", "closures", "events", "forces")] + [
+    _fields_ = [(name, ctypes.c_int32) for name in COUNTS] + [
         (table.name, ctypes.c_void_p) for table in fields(Tables)
     ]
 
@@ -147,19 +157,32 @@ _CHECKS = {
     65: ("event_threshold", "a finite number"),
     66: ("event_restitution", "a number from 0 to 1"),
     70: ("force_type", "one of " + ", ".join(f"{code} ({name})" for name, code in FORCE_TYPES.items())),
-    71: ("force_body", "two different bodies, -1 for the world"),
+    71: ("force_body", "a body that is there, of a spring two different ones; or a coordinate of its joint"),
     72: ("force_point", "finite numbers"),
     73: ("force_number", "finite numbers"),
+    74: ("force_start", "an instruction, not before the one before it"),
 }
 
 
 _INTEGERS = (
     "parent", "order", "joint_type", "q_index", "v_index", "closure_body", "closure_rows", "event_joint",
     "event_action", "event_occasion", "event_side", "force_type", "force_body",
+    "force_start", "force_code",
 )  # fmt: skip
 
 
-def _shapes(n: int, nq: int, nv: int, closures: int, events: int, forces: int) -> dict[str, tuple[int, ...]]:
+def counts(tables: Tables) -> dict[str, int]:
+    """Return how many there are of what: the ``COUNTS``."""
+    sized: tuple[Array | Index, ...] = (
+        tables.parent, tables.rest, tables.stiffness, tables.closure_rows, tables.event_joint,
+        tables.force_type, np.atleast_2d(tables.force_code)[:, 0], tables.force_constants,
+    )  # fmt: skip
+    return {name: int(np.size(table)) for name, table in zip(COUNTS, sized, strict=True)}
+
+
+def _shapes(
+    n: int, nq: int, nv: int, closures: int, events: int, forces: int, instructions: int, constants: int
+) -> dict[str, tuple[int, ...]]:
     integers = dict.fromkeys(("parent", "order", "joint_type", "q_index", "v_index"), (n,))
     points = dict.fromkeys(("parent_point", "child_point"), (n, 3))
     rotations = dict.fromkeys(("parent_rotation", "child_rotation"), (n, 3, 3))
@@ -167,29 +190,28 @@ def _shapes(n: int, nq: int, nv: int, closures: int, events: int, forces: int) -
     happening = ("joint", "action", "occasion", "side", "threshold", "restitution")
     closed = {"body": (2,), "rows": (), "point": (2, 3), "rotation": (2, 3, 3), "length": ()}
     pushing = {"type": (), "body": (2,), "point": (2, 3), "number": (3,)}
+    programs = {"start": (forces + 1,), "code": (instructions, 2), "constants": (constants,)}
     return (
         {"mass": (n,), "inertia": (n, 6), "gravity": (3,), "rest": (nq,)}
         | integers | points | rotations | degrees
         | {f"closure_{name}": (closures, *shape) for name, shape in closed.items()}
         | {f"event_{name}": (events,) for name in happening}
+        | {f"force_{name}": shape for name, shape in programs.items()}
         | {f"force_{name}": (forces, *shape) for name, shape in pushing.items()}
     )  # fmt: skip
 
 
 def contiguous(tables: Tables) -> dict[str, NDArray[Any]]:
     """Return the tables as contiguous arrays of the right type, or raise MechanismError for a shape."""
-    n, nq, nv = np.size(tables.parent), np.size(tables.rest), np.size(tables.stiffness)
-    arrays = {}
-    closures, events, forces = (
-        np.size(t) for t in (tables.closure_rows, tables.event_joint, tables.force_type)
-    )
-    for name, shape in _shapes(n, nq, nv, closures, events, forces).items():
+    many, arrays = counts(tables), {}
+    for name, shape in _shapes(**many).items():
         wanted = np.int32 if name in _INTEGERS else np.float64
         arrays[name] = np.ascontiguousarray(getattr(tables, name), dtype=wanted)
         if np.shape(getattr(tables, name)) != shape:
             raise MechanismError(
-                f"tables.{name}: expected shape {shape} for {n} bodies, {nq} coordinates and {nv} degrees of "
-                f"freedom; got {np.shape(getattr(tables, name))}. Make all tables of one mechanism."
+                f"tables.{name}: expected shape {shape} for {many['n']} bodies, {many['nq']} coordinates and "
+                f"{many['nv']} degrees of freedom; got {np.shape(getattr(tables, name))}. "
+                "Make all tables of one mechanism."
             )
     return arrays
 

@@ -202,6 +202,7 @@ def no_trajectory(n: int) -> Trajectory:
     blank |= {name: np.empty((0, n, width)) for name, width in widths.items()}
     blank |= {"q": np.empty((0, 0)), "v": np.empty((0, 0)), "step": np.empty(0, np.uint64)}
     blank |= {"closure_reaction": np.empty((0, 0, 6)), "event_time": np.empty((0, 0))}
+    blank |= {"force_effort": np.empty((0, 0)), "force_power": np.empty((0, 0))}
     return Trajectory(**blank)
 
 

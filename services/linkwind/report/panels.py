@@ -114,7 +114,7 @@ def _energy(run: Run) -> dict[str, Any]:
     parts = {
         "kinetic": path.kinetic_energy,
         "potential": path.potential_energy,
-        "work of the air": path.external_work,
+        "work of air and actuators": path.external_work,
         "dampers": path.dissipated_work,
     }
     rows = [

@@ -103,16 +103,26 @@ def _no_coordinate(joint: Joint) -> str:
 
 
 def _forces(scenario: Scenario) -> Iterator[Problem]:
-    known = [*(body.name for body in scenario.bodies), "world"]
+    bodies, joints = [body.name for body in scenario.bodies], [joint.name for joint in scenario.joints]
+    known = {"parent": [*bodies, "world"], "child": [*bodies, "world"], "body": bodies, "joint": joints}
     for index, force in enumerate(scenario.forces):
-        for key, word in (("parent", force.parent), ("child", force.child)):
-            if word not in known:
-                yield choice(("forces", index, key), "one of the bodies", known, word)
-        if force.parent == force.child:
-            advice = "Name another body, or world."
-            yield Problem(
-                ("forces", index, "child"), "another body than the parent", show(force.child), advice
-            )
+        for key in [key for key in known if key in type(force).model_fields]:
+            if (word := getattr(force, key)) not in known[key]:
+                what = "one of the joints" if key == "joint" else "one of the bodies"
+                yield choice(("forces", index, key), what, known[key], word)
+        if force.type == "spring" and force.parent == force.child:
+            expected, advice = "another body than the parent", "Name another body, or world."
+            yield Problem(("forces", index, "child"), expected, show(force.child), advice)
+        if force.type == "motion" and force.joint in _changing(scenario):
+            expected = "a joint to which nothing else happens"
+            got = f'"{force.joint}", which has events or stops'
+            yield Problem(("forces", index, "joint"), expected, got, "Use an actuator.")
+
+
+def _changing(scenario: Scenario) -> set[str]:
+    """Return the joints that are released, locked or stopped."""
+    stopped = {joint.name for joint in scenario.joints if joint.stop is not None}
+    return stopped | {event.joint for event in scenario.events}
 
 
 def _method(scenario: Scenario) -> Iterator[Problem]:

@@ -34,9 +34,7 @@ class Scenario(Section):
     events: tuple[Event, ...] = Field(
         default=(), strict=False, description="What happens to joints: release and lock"
     )
-    forces: tuple[Force, ...] = Field(
-        default=(), strict=False, description="Force elements of the mechanism: springs between points"
-    )
+    forces: tuple[Force, ...] = Field(default=(), strict=False, description="Force elements of the mechanism")
     providers: tuple[Provider, ...] = Field(
         strict=False, min_length=1, description="The force providers; [aero] is short for one named aero"
     )
