@@ -22,7 +22,11 @@ export function makePoses(scene) {
     centre: overview.centre,
     poses: (t) => (at(t) ?? newest.at(-1) ?? overview).poses(t),
     detailed: (t) => covers(detail, t),
-    set overview(scene) { overview = piece(scene); newest = newest.filter((each) => each.times.at(-1) > overview.times.at(-1)); },
+    set overview(next) {
+      overview = piece(next);
+      newest = newest.filter((each) => each.times.at(-1) > overview.times.at(-1));
+      scene.joints = next.joints; // some may have been released since
+    },
     set detail(scene) { detail = scene && piece(scene); },
     append(scene) { newest = [...newest.slice(-KEPT), piece(scene)]; },
   };
