@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from linkwind.dynamics.methods import check
 from linkwind.errors import InputError, MechanismError
 from linkwind.fmi.part import dynamics_part
 from linkwind.log.reader import open_log
+from linkwind.mechanism import build
 from linkwind.runs.run import run
 from linkwind.runs.verify import scenario_of, verify
 from linkwind.scenario import from_json, load
@@ -81,3 +84,18 @@ def test_a_mechanism_that_the_paper_does_not_have(tmp_path: Path):
 def test_an_fmu_is_of_the_default_method():
     with pytest.raises(InputError, match=r"dynamics\.method: expected reduced, .* got cfe\. Export with"):
         dynamics_part(load("two_link", ["dynamics.method=cfe"]), native_arrays=True)
+
+
+def test_what_nothing_can_move_is_refused_at_the_start():
+    """A point on a ball joint with a lever turns about the lever without resistance."""
+    solid, nothing = [0.1, 0.1, 0.1, 0, 0, 0], [0, 0, 0, 0, 0, 0]
+    bodies = [{"name": name, "mass": 1, "inertia": i} for name, i in (("base", solid), ("point", nothing))]
+    joint = {"name": "ball", "type": "spherical", "parent": "base", "child": "point"}
+    joint["child_point"] = [-0.2, 0, 0]
+    data = {"name": "case", "time": {"end": 1.0}, "bodies": bodies, "joints": [joint]}
+    scenario = from_json(json.dumps(data))
+    line = (
+        r'case\.toml: at the start: joint of body "point": expected inertia to move the body; got a singular'
+    )
+    with pytest.raises(MechanismError, match=line):
+        check(build(scenario), scenario)

@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
-from linkwind.errors import MechanismError
+import numpy as np
+
+from linkwind.errors import MechanismError, SimulationError
 from linkwind.mechanism import Mechanism
 from linkwind.native.cfe import Cfe, Stabilisation
 from linkwind.native.incremental import Incremental
 from linkwind.native.multibody import Multibody
 from linkwind.scenario import Scenario
 
+ADDING = ("plate", "flow", "fmu")  # models that may add inertia to bodies
+
 
 def check(mechanism: Mechanism, scenario: Scenario) -> None:
-    """Raise MechanismError if the method of the scenario cannot do the mechanism."""
-    multibody(mechanism, scenario)
+    """Raise MechanismError if the method of the scenario cannot do the mechanism, or nothing can move it.
+
+    Where providers add inertia, what can be moved shows only in the run.
+    """
+    made = multibody(mechanism, scenario)
+    if any(provider.model in ADDING for provider in scenario.providers):
+        return
+    try:
+        made.evaluate(made.initial_state(mechanism.q0, mechanism.v0), np.zeros((made.n, 6)))
+    except SimulationError as error:
+        raise MechanismError(f"{scenario.source}: at the start: {error}") from error
 
 
 def multibody(mechanism: Mechanism, scenario: Scenario) -> Multibody:
