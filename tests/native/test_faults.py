@@ -131,7 +131,7 @@ def test_tables(change, item):
 def test_no_bodies():
     empty = {name: np.zeros((0, *np.shape(value)[1:])) for name, value in vars(tables(two_link())).items()}
     with pytest.raises(MechanismError, match="at least one body"):
-        Multibody(Tables(**(empty | {"gravity": np.zeros(3)})))
+        Multibody(Tables(**(empty | {"gravity": np.zeros(3), "force_start": np.zeros(1, np.int32)})))
 
 
 def test_rest_quaternion_of_zero_length():
