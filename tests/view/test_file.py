@@ -125,7 +125,7 @@ def test_of_a_long_log_a_sample_is_shown_and_all_where_somebody_looks(browser, l
             browser.until(f"{T} === {k / 1000}")
         zoom = "{'xaxis.range[0]': 0.15, 'xaxis.range[1]': 0.17}"  # as a drag over the plot ends
         browser.evaluate(f"document.querySelector('.plot').emit('plotly_relayout', {zoom})")
-        browser.until(f"{points}.length === 21")
+        browser.until(f"{points}[0] === 0.15 && {points}.length === 21")
         shown = browser.evaluate("Array.from(document.querySelector('.plot').data[0].y)")
         assert shown == pytest.approx(path.linear[150:171, 0, 0].tolist(), rel=1e-5)
         browser.evaluate("document.querySelector('.plot').dispatchEvent(new MouseEvent('dblclick'))")
