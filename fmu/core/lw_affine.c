@@ -11,20 +11,20 @@ static const double affine_tolerance = 1e-12; /* of the sizes that a residual is
 typedef struct {
     int m;
     double *wrenches;                           /* (count,m) */
-    double *unit, *bias, *start, *twist, *residual; /* (m) */
-    double *cross, *compliance, *jacobian, *lu; /* (m,m) */
+    double *unit, *bias, *start, *twist, *residual, *pivots; /* (m) */
+    double *cross, *compliance, *jacobian; /* (m,m); the last one as its factors */
 } lw_work;
 
 size_t lw_affine_size(int32_t n) {
     size_t m = 6 * (size_t)n;
-    return LW_MAX_NODES * m + 5 * m + 4 * m * m;
+    return LW_MAX_NODES * m + 6 * m + 3 * m * m;
 }
 
 static lw_work lay_out(double *memory, int n) {
     int m = 6 * n;
-    double *vector = memory + LW_MAX_NODES * m, *matrix = vector + 5 * m;
-    lw_work work = {m, memory, vector, vector + m, vector + 2 * m, vector + 3 * m,
-                    vector + 4 * m, matrix, matrix + (size_t)m * m, matrix + 2 * (size_t)m * m, matrix + 3 * (size_t)m * m};
+    double *vector = memory + LW_MAX_NODES * m, *matrix = vector + 6 * m;
+    lw_work work = {m, memory, vector, vector + m, vector + 2 * m, vector + 3 * m, vector + 4 * m,
+                    vector + 5 * m, matrix, matrix + (size_t)m * m, matrix + 2 * (size_t)m * m};
     return work;
 }
 
@@ -228,8 +228,8 @@ int lw_multibody_advance_affine(lw_multibody *mb, const lw_macro_step *step, con
             return LW_OK;
         }
         if (k == 0 && (status = jacobian(mb, &trial, affine->inertia, &w))) return status;
-        memcpy(w.lu, w.jacobian, (size_t)m * m * sizeof(double));
-        if ((status = lw_solve(m, w.lu, w.residual))) break;
+        if (k == 0 && lw_factor(m, w.jacobian, w.pivots)) break;
+        lw_substitute(m, w.jacobian, w.pivots, w.residual);
         for (int i = 0; i < m; ++i) w.wrenches[i] += w.residual[i];
     }
     step->fault->item = worst, step->fault->time = step->h;

@@ -1,17 +1,7 @@
 /* The integrators: README, section Integrators. The vector y is (q, v, work, dissipated). */
-#include "lw_model.h"
-#include "lw_polynomial.h"
+#include "lw_integrate.h"
 
 #include <string.h>
-
-/* One macro step in progress. */
-typedef struct {
-    lw_multibody *mb;
-    const lw_macro_step *step;
-    lw_polynomial wrench;
-    double proposed; /* substep [s] that dopri5 would take next */
-    int interrupted; /* by an event */
-} lw_run;
 
 static int length(const lw_multibody *mb) { return mb->nq + mb->nv + 2; }
 
@@ -27,8 +17,7 @@ static int prescribe(lw_run *run, double time, double *y) {
     return status;
 }
 
-/* dy/dt at `s`, in units of the macro step, and `time` [s]; what is prescribed goes into y. */
-static int derive(lw_run *run, double s, double time, double *y, double *rate) {
+int lw_derive(lw_run *run, double s, double time, double *y, double *rate) {
     lw_multibody *mb = run->mb;
     const double *wrench = wrench_at(run, s), *v = y + mb->nq;
     double *powers = rate + mb->nq + mb->nv;
@@ -125,7 +114,7 @@ static int stages(lw_run *run, const lw_tableau *t, int first, double s, double 
             combine(mb, i, t->a[i], h, mb->trial);
             y = mb->trial;
         }
-        int status = derive(run, s + t->c[i] * width, time + t->c[i] * h, y, mb->rate[i]);
+        int status = lw_derive(run, s + t->c[i] * width, time + t->c[i] * h, y, mb->rate[i]);
         if (status) return status;
     }
     return LW_OK;
@@ -144,12 +133,19 @@ static int runge_kutta(lw_run *run, const lw_tableau *t, double s, double time, 
 static int semi_implicit_euler(lw_run *run, double s, double time, double width, double h) {
     lw_multibody *mb = run->mb;
     double *y = mb->y, *rate = mb->rate[0];
-    int status = derive(run, s, time, y, rate);
+    int status = lw_derive(run, s, time, y, rate);
     if (status) return status;
     for (int i = mb->nq; i < length(mb); ++i) y[i] += h * rate[i];
     lw_coordinate_rate(mb, y, y + mb->nq, rate);
     for (int i = 0; i < mb->nq; ++i) y[i] += h * rate[i];
     return settle(run, y, s + width, time + h);
+}
+
+/* ---- implicit: Radau IIA ---- */
+
+static int implicit(lw_run *run, double s, double time, double width, double h) {
+    int status = lw_radau5(run, s, time, width, h);
+    return status ? status : settle(run, run->mb->y, s + width, time + h);
 }
 
 /* ---- one step of a method, of `h` [s] from s and `time`; `width` is h, and s is, in macro steps ---- */
@@ -159,6 +155,7 @@ static int substep(lw_run *run, double s, double time, double width, double h) {
     case LW_EULER: return runge_kutta(run, &euler, s, time, width, h);
     case LW_SEMI_IMPLICIT_EULER: return semi_implicit_euler(run, s, time, width, h);
     case LW_RK4: return runge_kutta(run, &rk4, s, time, width, h);
+    case LW_RADAU5: return implicit(run, s, time, width, h);
     default: return runge_kutta(run, &dopri5, s, time, width, h);
     }
 }
@@ -262,7 +259,7 @@ static int accept(lw_run *run, double from, double time) {
     int status = settle(run, mb->y, time / run->step->h, run->step->time + time);
     if (!status) status = watch(run, from / run->step->h, time / run->step->h, time - from);
     if (!status && (mb->formulation || mb->rows || run->interrupted))
-        return derive(run, time / run->step->h, run->step->time + time, mb->y, mb->rate[0]);
+        return lw_derive(run, time / run->step->h, run->step->time + time, mb->y, mb->rate[0]);
     lw_coordinate_rate(mb, mb->y, mb->y + mb->nq, mb->rate[0]);
     return status;
 }
@@ -273,7 +270,7 @@ static int dormand_prince(lw_run *run) {
     lw_multibody *mb = run->mb;
     double time = 0.0, h = run->step->h, limit = run->step->h / run->step->substeps, largest = 5.0;
     double next = run->proposed > 0.0 ? fmin(run->proposed, limit) : limit;
-    int trouble = LW_OK, status = derive(run, 0.0, run->step->time, mb->y, mb->rate[0]);
+    int trouble = LW_OK, status = lw_derive(run, 0.0, run->step->time, mb->y, mb->rate[0]);
     if (run->proposed <= 0.0) run->proposed = next;
     for (int tried = 0; !status && time < h; ++tried) {
         int last = time + 1.01 * next >= h;
@@ -307,6 +304,7 @@ static int check_arguments(lw_run *run) {
     const lw_macro_step *step = run->step;
     if (!(step->h > 0.0) || !isfinite(step->h) || !isfinite(step->time)) return LW_BAD_STEP;
     if (step->substeps < 1) return LW_BAD_SUBSTEPS;
+    if (step->integrator == LW_RADAU5 && !step->memory) return LW_BAD_INTEGRATOR;
     if (!(step->rtol >= 0.0 && step->atol > 0.0)) return LW_BAD_TOLERANCE;
     if (lw_polynomial_init(&run->wrench, step->count, step->nodes)) return LW_BAD_NODES;
     return lw_inputs_check(run->mb, step->state, step->count, step->wrenches, step->added_inertia,
@@ -317,7 +315,8 @@ static int integrate(lw_run *run) {
     switch (run->step->integrator) {
     case LW_EULER:
     case LW_SEMI_IMPLICIT_EULER:
-    case LW_RK4: return equal_substeps(run);
+    case LW_RK4:
+    case LW_RADAU5: return equal_substeps(run);
     case LW_DOPRI5: return dormand_prince(run);
     default: return LW_BAD_INTEGRATOR;
     }

@@ -145,8 +145,9 @@ void lw_delassus_factor(lw_multibody *multibody);
 void lw_delassus_solve(lw_multibody *multibody);
 void lw_delassus_respond(lw_multibody *multibody, double *joint_velocity);
 void lw_delassus_close(lw_multibody *multibody, double *joint_acceleration);
-/* lw_projection.c: q and v moved onto the closures. */
+/* lw_projection.c: q and v moved onto the closures; v alone. */
 int lw_project(lw_multibody *multibody, double *q, double *v, lw_fault *fault);
+int lw_allow(lw_multibody *multibody, const double *q, double *v, lw_fault *fault);
 /* lw_events.c: take the joints for what the events of a state have made of them; whether any may still happen;
  * whether one happens at y; let all of those happen. */
 void lw_events_build(lw_multibody *multibody, const lw_tables *tables);
@@ -194,8 +195,10 @@ int lw_accelerations(lw_multibody *multibody, const double *q, const double *v, 
                      double *joint_acceleration, lw_fault *fault);
 lw_spatial lw_total_wrench(const lw_link *link, const double *wrench);
 double lw_wrench_power(const lw_multibody *multibody, const double *wrench);
-/* lw_linear.c: solve a x = b, (m,m) row-major; `a` is used up, x replaces b. */
-int lw_solve(int m, double *a, double *b);
+/* lw_linear.c: a (m,m), row-major, as the factors L U of its rows exchanged: row k with row pivots[k]; solve
+ * a x = b with them, x replaces b. */
+int lw_factor(int m, double *a, double *pivots);
+void lw_substitute(int m, const double *factors, const double *pivots, double *b);
 /* lw_inputs.c: index of the first number that is not finite, or -1; the inputs of a call */
 int lw_first_not_finite(const double *values, int count);
 int lw_inputs_check(const lw_multibody *multibody, const double *state, int32_t count,

@@ -15,7 +15,7 @@
 typedef enum { LW_FIXED, LW_REVOLUTE, LW_PRISMATIC, LW_PLANAR, LW_SPHERICAL, LW_FREE } lw_joint_type;
 enum { LW_JOINT_TYPES = 6 };
 
-typedef enum { LW_EULER, LW_SEMI_IMPLICIT_EULER, LW_RK4, LW_DOPRI5 } lw_integrator;
+typedef enum { LW_EULER, LW_SEMI_IMPLICIT_EULER, LW_RK4, LW_DOPRI5, LW_RADAU5 } lw_integrator;
 
 /* What a closure keeps: bits of closure_rows. Translations are along the axes of the frame on its first body,
  * rotations about them; both frames coincide where all is kept. LW_DISTANCE stands alone. */
@@ -110,6 +110,7 @@ typedef enum {
     LW_JOINT_OPEN,           /* item: body whose joint cannot be closed */
     LW_OPEN,                 /* item: closure that the mechanism cannot close */
     LW_CROWDED,              /* item: event that happens too often in a step */
+    LW_NEWTON,               /* item: body whose joint Newton's method of radau5 does not converge for */
     LW_FORCE_NOT_FINITE = 13, /* item: force element whose program gives no number */
     LW_POINTS_MEET,          /* item: force element whose points coincide, so that it has no direction */
     /* arguments */
@@ -189,7 +190,11 @@ typedef struct {
     double *work;                /* out (2): work of the whole wrench on the bodies, energy taken by the
                                     joint dampers and by events [J] */
     lw_fault *fault;             /* out, if the status is not 0 */
+    double *memory;              /* lw_radau5_size(nq,nv) doubles of the caller's, for the time of the call; or
+                                    NULL, for all integrators but radau5 */
 } lw_macro_step;
+
+LW_API size_t lw_radau5_size(int32_t nq, int32_t nv);
 
 LW_API int lw_multibody_advance(lw_multibody *multibody, const lw_macro_step *step);
 

@@ -80,6 +80,12 @@ int lw_project(lw_multibody *mb, double *q, double *v, lw_fault *fault) {
     return status;
 }
 
+int lw_allow(lw_multibody *mb, const double *q, double *v, lw_fault *fault) {
+    int status = prepare(mb, q, v, fault);
+    if (!status) project_v(mb, q, v);
+    return status;
+}
+
 int lw_multibody_close(lw_multibody *mb, double *state, lw_fault *fault) {
     int row = lw_first_not_finite(state, mb->nq + mb->nv + 1);
     fault->item = row;

@@ -16,7 +16,7 @@ static const double not_yet = -1.0;  /* time of an event */
 struct lw_part {
     uint32_t first[LW_DYNAMICS_SECTIONS + 1];
     lw_multibody *multibody;
-    double *state, *wrench;
+    double *state, *wrench, *stages; /* stages: memory of radau5, if it is there */
     lw_evaluation out;
     const double *added; /* added inertia, NULL where it is zero */
 };
@@ -73,7 +73,7 @@ static lw_tables constants(void) {
 size_t lw_part_size(void) {
     lw_tables tables = constants();
     size_t doubles = lw_state_size() + 1 + (size_t)lw_fmu_events + (MAX_ORDER + 1 + 3) * forces() + (size_t)lw_fmu_nv;
-    doubles += 6 * (size_t)lw_fmu_closures + 2 * (size_t)lw_fmu_forces;
+    doubles += 6 * (size_t)lw_fmu_closures + 2 * (size_t)lw_fmu_forces + lw_radau5_size(lw_fmu_nq, lw_fmu_nv);
     return (sizeof(lw_part) + 7) / 8 * 8 + doubles * sizeof(double) + (lw_multibody_size(&tables) + 7) / 8 * 8;
 }
 
@@ -94,6 +94,7 @@ void lw_part_create(lw_instance *instance) {
     part->out.closure_reaction = next, next += 6 * lw_fmu_closures;
     part->out.effort = next, next += lw_fmu_forces;
     part->out.power = next, next += lw_fmu_forces;
+    part->stages = next, next += lw_radau5_size(lw_fmu_nq, lw_fmu_nv);
     part->multibody = (lw_multibody *)(void *)next;
 }
 
@@ -141,9 +142,11 @@ static int refuse_table(const lw_instance *instance, int status, const lw_fault 
 static int check_solver(const lw_instance *instance) {
     int32_t integrator = instance->integers[LW_INTEGRATOR], substeps = instance->integers[LW_SUBSTEPS];
     double rtol = *AT(RTOL), atol = *AT(ATOL);
-    if (integrator < LW_EULER || integrator > LW_DOPRI5)
-        return lw_report(instance, LW_FMI_ERROR, "%s: Expected 0 euler, 1 semi-implicit euler, 2 rk4 or "
-                         "3 dopri5 but was %d.", lw_name_at(LW_TYPE_INT32, LW_INTEGRATOR), integrator);
+    int implicit = lw_radau5_size(lw_fmu_nq, lw_fmu_nv) > 0;
+    if (integrator < LW_EULER || integrator > (implicit ? LW_RADAU5 : LW_DOPRI5))
+        return lw_report(instance, LW_FMI_ERROR, "%s: Expected 0 euler, 1 semi-implicit euler, 2 rk4, 3 dopri5%s "
+                         "but was %d.", lw_name_at(LW_TYPE_INT32, LW_INTEGRATOR), implicit ? " or 4 radau5" : "",
+                         integrator);
     if (substeps < 1)
         return lw_report(instance, LW_FMI_ERROR, "%s: Expected at least 1 but was %d.",
                          lw_name_at(LW_TYPE_INT32, LW_SUBSTEPS), substeps);
@@ -173,6 +176,7 @@ static int discard(const lw_instance *instance, int status, const lw_fault *faul
     if (status == LW_OPEN) expected = "loops that stay closed", was = "one that does not reach";
     if (status == LW_FORCE_NOT_FINITE) expected = "an expression that gives numbers", was = "one that does not";
     if (status == LW_POINTS_MEET) expected = "points apart", was = "two that coincide";
+    if (status == LW_NEWTON) expected = "Newton's method of radau5 to converge", was = "not so in these substeps";
     if (status == LW_STEP_UNDERFLOW) expected = "a substep that meets the tolerance", was = "none";
     return lw_report(instance, LW_FMI_DISCARD, "Expected %s but was %s at body, loop or force %d, %.9g s into the step.",
                      expected, was, fault->item, fault->time);
@@ -355,7 +359,8 @@ int lw_part_advance(lw_instance *instance, double h, int32_t pieces) {
         .added_inertia = find_added(instance), .integrator = instance->integers[LW_INTEGRATOR],
         .substeps = pieces > 1 ? 1 : instance->integers[LW_SUBSTEPS],
         .rtol = *AT(RTOL), .atol = *AT(ATOL),
-        .next = part->state, .work = work, .fault = &fault};
+        .next = part->state, .work = work, .fault = &fault,
+        .memory = part->stages};
     int status = lw_multibody_advance(part->multibody, &step);
     if (status) return discard(instance, status, &fault);
     store_state(instance);

@@ -22,6 +22,11 @@ int lw_project(lw_multibody *mb, double *q, double *v, lw_fault *fault) {
     return LW_OK;
 }
 
+int lw_allow(lw_multibody *mb, const double *q, double *v, lw_fault *fault) {
+    (void)mb, (void)q, (void)v, (void)fault;
+    return LW_OK;
+}
+
 int lw_multibody_close(lw_multibody *mb, double *state, lw_fault *fault) {
     (void)mb, (void)state, (void)fault;
     return LW_OK;

@@ -128,7 +128,7 @@ def test_parameters_without_sense(running, section, values, words):
     running.step(0.0, 0.1)
 
 
-@pytest.mark.parametrize(("name", "value"), [("INTEGRATOR", 4), ("INTEGRATOR", -1), ("SUBSTEPS", 0)])
+@pytest.mark.parametrize(("name", "value"), [("INTEGRATOR", 5), ("INTEGRATOR", -1), ("SUBSTEPS", 0)])
 def test_solver_without_sense(running, name, value):
     assert running.set_integer(name, value) == OK
     refused(running, running.try_step(0.0, 0.1)[0], name, f"but was {value}")

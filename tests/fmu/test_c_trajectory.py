@@ -39,6 +39,7 @@ def set_wrench(fmu: Instance, wrench: np.ndarray) -> None:
         (Integrator.EULER, 1),
         (Integrator.SEMI_IMPLICIT_EULER, 2),
         (Integrator.DOPRI5, 1),
+        (Integrator.RADAU5, 2),
     ],
 )
 @pytest.mark.parametrize("mechanism", ["planar", "spatial"])

@@ -36,15 +36,25 @@ def by_zig(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 @pytest.mark.parametrize(
-    ("scenario", "end"), [("two_link", "0.3"), ("two_link_gust", "0.3"), ("two_link_flow", "0.01")]
+    ("scenario", "end", "integrator"),
+    [
+        ("two_link", "0.3", "rk4"),
+        ("two_link_gust", "0.3", "rk4"),
+        ("two_link_gust", "0.1", "radau5"),
+        ("two_link_flow", "0.01", "rk4"),
+    ],
 )
-def test_a_run_with_the_library_of_another_compiler_has_the_same_bits(by_zig, scenario, end, tmp_path):
+def test_a_run_with_the_library_of_another_compiler_has_the_same_bits(
+    by_zig, scenario, end, integrator, tmp_path
+):
     """What zig's runtime has of libm, and pulls in on some occasions, differs in the last bit."""
     digests = []
     for name, library in (("own", ""), ("zig", by_zig)):
         settings = [
             "--set",
             f"time.end={end}",
+            "--set",
+            f"dynamics.integrator={integrator}",
             "--set",
             "bus.transport=inprocess",
             "--out",

@@ -45,7 +45,7 @@ WRONG = [
     ('"pec"', '"strong"', 'coupling.scheme: expected one of explicit, pec, implicit; '
     'got "strong". Use one of these.'),
     ('"rk4"', '"ode45"',
-     'dynamics.integrator: expected one of euler, semi_implicit_euler, rk4, dopri5; got "ode45". '
+     'dynamics.integrator: expected one of euler, semi_implicit_euler, rk4, dopri5, radau5; got "ode45". '
      'Use "dopri5".'),
     ('integrator = "rk4"', 'method = "incremental"',
      "dynamics.integrator: expected euler or semi_implicit_euler: the method incremental is of first order; "

@@ -17,11 +17,12 @@ from linkwind.fmi.toolchain import PLATFORMS
 DATA_FILE = "lw_fmu_data.c"
 HIDE = "-DLW_API="  # the library itself is not exported
 _AT_ONCE = 2  # compilers
-# Files of the core for what not every mechanism has; without it, one of `fmu/without` takes their place.
+# Files of the core that not every mechanism needs; one of `fmu/without` takes their place.
 _OPTIONAL = {
     "closures": ("lw_closures.c", "lw_delassus.c", "lw_projection.c"),
     "events": ("lw_events.c", "lw_impulse.c"),
     "forces": ("lw_elements.c", "lw_expression.c"),
+    "radau5": ("lw_radau5.c", "lw_linear.c"),
 }
 
 
@@ -34,10 +35,9 @@ def c_sources(part: Part, version: FmiVersion) -> dict[str, bytes]:
         f"lw_fmi{other_version}.c",
         f"fmi{other_version}.h",
         "lw_affine.c",  # to couple is the importer's
-        "lw_linear.c",
     }
     root = files("linkwind").joinpath("_data", "fmu")
-    absent = [what for what in _OPTIONAL if mechanism and not getattr(part.mechanism, what)]
+    absent = _absent(part) if mechanism else []
     left_out.update(name for what in absent for name in _OPTIONAL[what])
     shared = () if mechanism else ("lw_math.h", "lw_expression.h", "lw_expression.c")
     found = {name: root.joinpath("core", name).read_bytes() for name in shared}
@@ -49,6 +49,12 @@ def c_sources(part: Part, version: FmiVersion) -> dict[str, bytes]:
         name = f"lw_without_{what}.c"
         found[name] = root.joinpath("without", name).read_bytes()
     return dict(sorted(found.items()))
+
+
+def _absent(part: Part) -> list[str]:
+    has = {what: getattr(part.mechanism, what) for what in ("closures", "events", "forces")}
+    has["radau5"] = part.scenario.dynamics.integrator == "radau5"
+    return [what for what in _OPTIONAL if not has[what]]
 
 
 def flags() -> list[str]:

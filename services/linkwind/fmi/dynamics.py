@@ -295,14 +295,16 @@ def _element_parameters(mechanism: Mechanism, elements: Elements) -> Iterator[Va
 
 def _solver(scenario: Scenario) -> Iterator[Variable]:
     settings = scenario.dynamics
-    names = ", ".join(f"{member.value} {member.name.lower()}" for member in Integrator)
+    own = Integrator[settings.integrator.upper()]
+    there = [member for member in Integrator if member == own or member != Integrator.RADAU5]
+    names = ", ".join(f"{member.value} {member.name.lower()}" for member in there)
     for name, at, value, about, highest in (
         (
             "integrator",
             0,
-            Integrator[settings.integrator.upper()],
+            own,
             f"Integrator: {names}",
-            len(Integrator) - 1,
+            len(there) - 1,
         ),
         ("substeps", 1, settings.substeps, "Integrator steps in a communication step", MAX_SUBSTEPS),
     ):

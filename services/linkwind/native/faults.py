@@ -24,7 +24,7 @@ class Names(NamedTuple):
     forces: Sequence[str]
 
 
-_REPAIR = "Check forces, stiffnesses and dampers; a smaller step, more substeps or dopri5 may help"
+_REPAIR = "Check forces, stiffnesses and dampers; a smaller step, more substeps, dopri5 or radau5 may help"
 _NUMERICS = {
     1: ("joint of body {item}", "inertia to move the body", "a singular inertia",
         "Give the body mass, inertia or added inertia"),
@@ -42,6 +42,8 @@ _NUMERICS = {
     10: ("joint {item}", "bodies that close the loop", "a position from which they do not reach",
         "Check points, lengths and the start; a smaller step may help"),
     11: ("event {item}", "a few times within a step", "a thousand", "Give its stop a smaller restitution"),
+    12: ("joint of body {item}", "Newton's method of radau5 to converge", "changes that do not get small",
+        "Take more substeps"),
     13: ("force {item}", "a finite number", "NaN or infinity",
         "Does its expression divide by zero, or leave a function's domain?"),
     14: ("force {item}", "two points apart", "points that coincide, so that it has no direction",

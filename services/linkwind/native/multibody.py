@@ -59,6 +59,7 @@ _pointer, _int, _double = ctypes.c_void_p, ctypes.c_int32, ctypes.c_double
 _size = declare("lw_multibody_size", [_pointer], ctypes.c_size_t)
 _init = declare("lw_multibody_init", [_pointer] * 3)
 _advance = declare("lw_multibody_advance", [_pointer] * 2)
+_radau5_size = declare("lw_radau5_size", [_int] * 2, ctypes.c_size_t)
 _affine_size = declare("lw_affine_size", [_int], ctypes.c_size_t)
 _affine_inertia = declare("lw_affine_inertia", [_pointer] * 4 + [_double, _pointer], None)
 _advance_affine = declare("lw_multibody_advance_affine", [_pointer] * 3)
@@ -71,10 +72,10 @@ _close = declare("lw_multibody_close", [_pointer] * 3)
 _energy = declare("lw_multibody_energy", [_pointer] * 4, None)
 _joint_gap = declare("lw_multibody_joint_gap", [_pointer] * 3, _double)
 _repeat = declare("lw_multibody_repeat", [_pointer, _pointer, _int])
-# lw_macro_step: packing all of it at once is several times faster than converting fourteen arguments.
+# lw_macro_step: packing all of it at once is several times faster than converting fifteen arguments.
 NOT_YET, ORDERED = -1.0, -2.0  # in a state: an event that has not happened; one that shall, on command
 KNOWN_ARRAYS = 32  # whose addresses are remembered
-_macro_step = struct.Struct("@PddPPPddiiiPPP")
+_macro_step = struct.Struct("@PddPPPddiiiPPPP")
 _affine = struct.Struct("@PPPPPP")
 _evaluation = struct.Struct("@7P")
 
@@ -139,6 +140,7 @@ class Multibody:
         self._step_at = ctypes.addressof(self._step)
         self._affine = ctypes.create_string_buffer(_affine.size)
         self._met, self._scratch = np.zeros(0), np.zeros(0)  # made when an affine wrench comes
+        self._stages = np.zeros(0)  # made when radau5 is asked for
         self._known: dict[int, tuple[Array, int]] = {}
         if status := _init(self._model, ctypes.addressof(native), self._fault_at):
             refuse(tables, status, self._fault.item)
@@ -216,7 +218,8 @@ class Multibody:
             by the joint dampers and by events, integrated with the same scheme.
 
         Raises:
-            SimulationError: singular inertia, NaN or infinity, or an underflow of the substep.
+            SimulationError: singular inertia, NaN or infinity, an underflow of the substep, or Newton's
+                method of radau5 does not converge.
             ValueError: an argument that makes no sense, or of a wrong shape.
         """
         self._prepare(state, h, nodes, wrenches, added_inertia, integrator, time, substeps, rtol, atol)
@@ -238,7 +241,7 @@ class Multibody:
         _macro_step.pack_into(
             self._step, 0, self._state_at, h, time, self._locate(nodes), self._locate(wrenches),
             self._locate_added(added_inertia), rtol, atol, count, integrator, substeps,
-            self._next_at, self._work_at, self._fault_at,
+            self._next_at, self._work_at, self._fault_at, self._locate_stages(integrator),
         )  # fmt: skip
 
     def advance_affine(
@@ -397,6 +400,13 @@ class Multibody:
                 self._known.clear()
             known = self._known[id(array)] = (array, address(array))  # kept alive: the id stays its own
         return known[1]
+
+    def _locate_stages(self, integrator: int) -> int:
+        if integrator != Integrator.RADAU5:
+            return 0
+        if not len(self._stages):
+            self._stages = np.zeros(_radau5_size(self.nq, self.nv))
+        return self._locate(self._stages)
 
     def _locate_added(self, added_inertia: Array | None) -> int:
         if added_inertia is None:

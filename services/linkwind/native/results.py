@@ -9,12 +9,13 @@ from linkwind.spatial import Array
 
 
 class Integrator(enum.IntEnum):
-    """How a macro step is taken; all but DOPRI5 take equal substeps."""
+    """How a macro step is taken; all but DOPRI5 take equal substeps, RADAU5 is implicit."""
 
     EULER = 0
     SEMI_IMPLICIT_EULER = 1
     RK4 = 2
     DOPRI5 = 3
+    RADAU5 = 4
 
 
 class AffineStep(NamedTuple):

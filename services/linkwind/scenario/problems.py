@@ -26,6 +26,8 @@ SYNONYMS = {
     "runge_kutta": "rk4",
     "rk45": "dopri5",
     "ode45": "dopri5",
+    "radau": "radau5",
+    "ode15s": "radau5",
     "angle": "angle_deg",
     "dt": "step",
     "implicit": "pec",  # spelled like explicit, but that is the opposite

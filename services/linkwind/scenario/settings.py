@@ -12,7 +12,7 @@ from linkwind.scenario.quantities import Section, Vector, quantity
 
 Method = Literal["reduced", "cfe", "incremental"]
 Stabilisation = Literal["none", "baumgarte", "projection"]
-IntegratorName = Literal["euler", "semi_implicit_euler", "rk4", "dopri5"]
+IntegratorName = Literal["euler", "semi_implicit_euler", "rk4", "dopri5", "radau5"]
 Scheme = Literal["explicit", "pec", "implicit"]
 Acceleration = Literal["aitken", "iqn_ils"]
 Transport = Literal["zenoh", "inprocess"]

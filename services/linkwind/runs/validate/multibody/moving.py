@@ -17,6 +17,7 @@ from linkwind.spatial import Array, Motion
 HELD = np.zeros(1)
 TIGHT: dict[str, Any] = {"integrator": Integrator.DOPRI5, "rtol": 1e-12, "atol": 1e-12}
 RK4: dict[str, Any] = {"integrator": Integrator.RK4}
+RADAU5: dict[str, Any] = {"integrator": Integrator.RADAU5}
 
 
 class Moving:
