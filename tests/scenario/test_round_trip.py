@@ -135,6 +135,7 @@ def test_builtin_names():
         "chain",
         "cylinder",
         "falling_plate",
+        "flapper",
         "four_bar",
         "stage_separation",
         "two_link",
