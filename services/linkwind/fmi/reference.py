@@ -76,7 +76,8 @@ def _dynamics(part: Part) -> tuple[Rows, Rows]:
         inputs.append(_flat({"FORCE": wrench[:, :3], "TORQUE": wrench[:, 3:]}))
         state, _ = multibody.advance(
             state, part.step, node, wrench[None].copy(), None, integrator=integrator,
-            time=k * part.step, substeps=settings.substeps, rtol=settings.rtol, atol=settings.atol,
+            time=k * part.scenario.coupling.step_ns / 1e9, substeps=settings.substeps,
+            rtol=settings.rtol, atol=settings.atol,
         )  # fmt: skip
         if (k + 1) % EVERY == 0:
             multibody.motion(state, motion)
