@@ -101,7 +101,7 @@ def test_aero_stays_for_the_next_run(project: Project) -> None:
 @pytest.mark.parametrize(
     ("settings", "error"),
     [
-        ({"SCENARIO": "nonsense"}, "nonsense: expected a file or one of cylinder"),
+        ({"SCENARIO": "nonsense"}, "nonsense: expected a file or one of andrews"),
         ({"STEP": "fast"}, 'coupling.step: expected a number [s]; got "fast"'),
     ],
     ids=["scenario", "step"],
