@@ -1,6 +1,6 @@
 """Runs that are killed at random moments: recovered and resumed, they end in the same state to the bit.
 
-Ten in CI; all fifty by ``LINKWIND_KILLS=50 pytest tests/faults/test_killed_and_resumed.py``.
+Ten in CI; all fifty by ``LINKWIND_KILLS=50 pytest -m slow tests/faults/test_killed_and_resumed.py``.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Every command on every kind of damaged file: an error that says what, or a part that says what is missing.
 
 Never a traceback, and never a number that the whole file does not give. A short form here; all of it by
-``LINKWIND_DAMAGES=300 pytest tests/runs/test_damaged.py``.
+``LINKWIND_DAMAGES=300 pytest -m slow tests/runs/test_damaged.py``.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Every built-in scenario: verified bit for bit over both transports, and resumed from every checkpoint.
 
 A short form here, each scenario once; all of it, with longer runs, by
-``LINKWIND_LOGS=long pytest tests/scenarios/test_logs.py``.
+``LINKWIND_LOGS=long pytest -m slow tests/scenarios/test_logs.py``.
 """
 
 from __future__ import annotations

@@ -1,0 +1,39 @@
+"""What newcomers need not wait for: `pytest -m slow` runs it, and CI does."""
+
+import pytest
+
+FLOWS = ("cylinder", "falling_plate", "two_link_flow_free", "vortex_induced_vibration")
+SLOW = (
+    "tests/bus/test_checkpoints.py::test_large",
+    "tests/docker/test_stay.py",
+    "tests/faults/test_disk.py::test_slow_disk",
+    "tests/faults/test_killed_and_resumed.py",
+    "tests/fmi/test_platforms.py",
+    "tests/fmi_host/test_wine.py",
+    "tests/fmu/test_c_fuzz.py",
+    "tests/native/test_compilers.py",
+    "tests/networks",
+    "tests/runs/test_damaged.py",
+    "tests/runs/test_replay.py::test_interrupted",
+    "tests/runs/test_replay.py::test_many_messages",
+    "tests/runs/test_replay.py::test_paused",
+    "tests/runs/test_resume.py::test_a_flow",
+    "tests/scenarios/test_logs.py",
+    "tests/scenarios/test_orders.py::test_an_order_over_the_bus",
+    "tests/security",
+    "tests/view/test_live.py",
+    *(
+        f"tests/runs/test_verify.py::test_every_built_in_scenario_gives_the_same_bits_again[{n}"
+        for n in FLOWS
+    ),
+    *(f"tests/scenarios/test_runs.py::test_run_leaves_a_complete_log_and_a_report[{n}" for n in FLOWS),
+    *(f"tests/scenarios/test_runs.py::test_transport_changes_no_bit[{n}" for n in FLOWS),
+)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark them, before those that are not wanted are left out."""
+    for item in items:
+        if item.nodeid.startswith(SLOW):
+            item.add_marker("slow")
