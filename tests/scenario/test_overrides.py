@@ -114,7 +114,7 @@ def test_every_key_of_every_builtin_can_be_set_to_what_it_is():
     import json
 
     def leaves(value, path=""):
-        if isinstance(value, dict) and set(value) == {"expression"}:
+        if isinstance(value, dict) and "expression" in value:
             yield path[1:], value["expression"]  # as the file has it
         elif isinstance(value, dict):
             for key, inner in value.items():
