@@ -10,8 +10,7 @@ from linkwind.native.cfe import Cfe, Stabilisation
 from linkwind.native.incremental import Incremental
 from linkwind.native.multibody import Multibody
 from linkwind.scenario import Scenario
-
-ADDING = ("plate", "flow", "fmu")  # models that may add inertia to bodies
+from linkwind.scenario.providers import ADDING_INERTIA
 
 
 def check(mechanism: Mechanism, scenario: Scenario) -> None:
@@ -20,7 +19,7 @@ def check(mechanism: Mechanism, scenario: Scenario) -> None:
     Where providers add inertia, what can be moved shows only in the run.
     """
     made = multibody(mechanism, scenario)
-    if any(provider.model in ADDING for provider in scenario.providers):
+    if any(provider.model in ADDING_INERTIA for provider in scenario.providers):
         return
     try:
         made.evaluate(made.initial_state(mechanism.q0, mechanism.v0), np.zeros((made.n, 6)))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from linkwind.scenario.problems import Path, Problem, choice, show
+from linkwind.scenario.providers import ADDING_INERTIA
 from linkwind.scenario.settings import nanoseconds
 
 if TYPE_CHECKING:
@@ -213,7 +214,7 @@ def _first(names: Sequence[str]) -> str:
 
 def _masses(scenario: Scenario) -> Iterator[Problem]:
     """A body moves only if it, a model or what hangs on it has inertia."""
-    adding = [entry for entry in scenario.providers if entry.model in ("plate", "flow", "fmu")]
+    adding = [entry for entry in scenario.providers if entry.model in ADDING_INERTIA]
     given = {name for entry in adding for name in entry.bodies}
     parents = {joint.child: joint.parent for joint in reversed(scenario.joints)}
     for body in scenario.bodies:  # what carries mass has it

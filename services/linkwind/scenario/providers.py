@@ -11,6 +11,7 @@ from linkwind.scenario.problems import ProblemError
 from linkwind.scenario.quantities import Name, Section, Vector, quantity
 
 AeroModel = Literal["none", "field", "plate", "flow", "fmu"]
+ADDING_INERTIA: tuple[AeroModel, ...] = ("plate", "flow", "fmu")  # models that may move massless bodies
 PlateCoefficients = Literal["ristroph", "andersen"]
 
 
