@@ -48,6 +48,8 @@ function cone(tip, along, height, radius) {
 
 export function makeSpace(host, motion, clock) {
   const { scene } = motion, follow = document.getElementById("follow");
+  const far = Math.hypot(...motion.world.high.map((x, k) => x - motion.world.low[k]));
+  follow.checked = far > 14 * motion.world.reach; // as the report does
   const bodies = scene.bodies.map((body) => ({ ...facesOf(body), edges: edgesOf(body) }));
   const up = scene.up === "z" ? { x: 0, y: 0, z: 1 } : { x: 0, y: 1, z: 0 };
   let colour = theme(), drawn = 0, waiting = 0, ready = false;
