@@ -200,6 +200,8 @@ int32_t lw_incremental_attach(void *memory, lw_multibody *mb) {
     p->formulation.spring_energy = p->formulation.damper_power = nothing;
     p->formulation.tree = NULL;
     p->formulation.occasion = NULL; /* there are no events */
+    p->formulation.closure_reactions = NULL; /* no loops */
+    p->formulation.coordinates = NULL; /* other than its own */
     p->mass = (double *)(p + 1);
     p->right = p->mass + nv * nv;
     p->along = p->right + nv;

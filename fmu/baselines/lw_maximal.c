@@ -205,6 +205,8 @@ void lw_maximal_attach(void *memory, lw_multibody *bodies, lw_multibody *tree, i
     m->formulation.damper_power = damper_power;
     m->formulation.tree = tree;
     m->formulation.occasion = lw_maximal_occasion;
+    m->formulation.closure_reactions = lw_maximal_closure_reactions;
+    m->formulation.coordinates = lw_maximal_coordinates;
     m->tree = tree;
     m->n = tree->n;
     m->constraints = (int32_t)c.constraints;
@@ -265,7 +267,7 @@ void lw_maximal_start(lw_multibody *bodies, const double *tree_state, double *st
     memcpy(state + memory + 1, tree_state + tree_memory + 1, (size_t)tree->events * sizeof(double));
 }
 
-void lw_maximal_coordinates(lw_multibody *bodies, const double *state, double *q, double *v) {
+void lw_maximal_coordinates(lw_multibody *bodies, const double *state, lw_unaligned *q, lw_unaligned *v) {
     lw_maximal *m = (lw_maximal *)bodies->formulation;
     lw_modes(bodies, state + bodies->nq + bodies->nv + 1);
     lw_maximal_follow(m, bodies);

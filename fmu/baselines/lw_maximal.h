@@ -22,12 +22,13 @@ LW_API void lw_maximal_attach(void *memory, lw_multibody *bodies, lw_multibody *
 
 /* Force and torque (closures,6) of what closes loops, after the last evaluation: of the first on the second body
  * at the point on the second. */
-LW_API void lw_maximal_closure_reactions(const lw_multibody *bodies, double *reaction);
+void lw_maximal_closure_reactions(const lw_multibody *bodies, double *reaction);
 
 /* The state of the bodies (nq + nv + 1) that a state of the tree means. */
 LW_API void lw_maximal_start(lw_multibody *bodies, const double *tree_state, double *state);
 
 /* The tree's coordinates q and v, as they follow from the poses and twists of the bodies. */
-LW_API void lw_maximal_coordinates(lw_multibody *bodies, const double *state, double *q, double *v);
+LW_API void lw_maximal_coordinates(lw_multibody *bodies, const double *state, lw_unaligned *q,
+                                   lw_unaligned *v);
 
 #endif

@@ -280,6 +280,8 @@ int lw_multibody_evaluate(lw_multibody *mb, const double *state, double time, co
         store6(e->total_wrench + 6 * l->body, lw_total_wrench(l, wrench));
     }
     store_elements(mb, e);
+    if (mb->formulation && mb->formulation->closure_reactions)
+        mb->formulation->closure_reactions(mb, e->closure_reaction);
     return LW_OK;
 }
 

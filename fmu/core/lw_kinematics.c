@@ -154,6 +154,7 @@ static double gap(const lw_link *l, int32_t parent_body, const lw_unaligned *pos
 double lw_multibody_joint_gap(const lw_multibody *mb, const lw_unaligned *position,
                               const lw_unaligned *orientation) {
     double largest = 0.0;
+    if (mb->formulation && mb->formulation->tree) mb = mb->formulation->tree;
     for (int i = 0; i < mb->n; ++i) {
         const lw_link *l = &mb->link[i];
         double own = gap(l, l->parent < 0 ? -1 : mb->link[l->parent].body, position, orientation);

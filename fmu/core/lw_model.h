@@ -96,6 +96,8 @@ typedef struct {
     double (*damper_power)(const lw_multibody *multibody, const double *v);
     lw_multibody *tree; /* its joints, with their actuators */
     double (*occasion)(lw_multibody *multibody, int32_t event, const double *y, double time); /* seen from it */
+    void (*closure_reactions)(const lw_multibody *multibody, double *reaction); /* at the last evaluation */
+    void (*coordinates)(lw_multibody *multibody, const double *state, lw_unaligned *q, lw_unaligned *v); /* of it */
 } lw_formulation;
 
 struct lw_multibody {

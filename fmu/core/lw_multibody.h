@@ -241,6 +241,33 @@ LW_API int lw_multibody_evaluate(lw_multibody *multibody, const double *state, d
                                  const double *added_inertia, const lw_evaluation *evaluation,
                                  lw_fault *fault);
 
+/* Numbers of an accepted state. */
+typedef struct {
+    double kinetic, potential; /* as lw_multibody_energy [J] */
+    double gap;                /* as lw_multibody_joint_gap [m] */
+    double force;              /* largest of total_wrench [N] */
+    double missed;             /* accepted minus trial twist, squared, by mass and mean principal inertia [J] */
+    double lost;               /* power of the wrench on that difference [W] */
+} lw_measures;
+
+/* An accepted state as it is written: evaluated once, and put where the caller wants it. */
+typedef struct {
+    const double *state, *trial; /* trial: the state that the wrench was asked for */
+    double time;                 /* [s] */
+    const double *wrench, *added_inertia; /* as lw_multibody_evaluate */
+    lw_evaluation evaluation;    /* room for it */
+    double *difference;          /* (n,6) room */
+    int32_t closures;            /* of `closure_reaction` */
+    lw_unaligned *position, *orientation, *linear, *angular; /* out, as lw_multibody_motion */
+    lw_unaligned *q, *v;         /* out: of the joints of the mechanism */
+    lw_unaligned *acceleration, *reaction, *total_wrench, *closure_reaction, *effort, *power; /* out */
+    lw_unaligned *event_time;    /* out (events) */
+    lw_measures *measures;       /* out */
+    lw_fault *fault;
+} lw_point;
+
+LW_API int lw_multibody_point(lw_multibody *multibody, const lw_point *point);
+
 /* Put the coordinates (in place) that motions prescribe to what they are at `time` [s], and their rates. */
 LW_API int lw_multibody_prescribe(lw_multibody *multibody, double *state, double time, lw_fault *fault);
 

@@ -98,17 +98,8 @@ class MotionMessage(_Message):
             accepted=motion(),
             trial=motion(),
         )
-        self.accepted = self._motion("accepted", n)
-        self.trial = self._motion("trial", n)
-
-    def _motion(self, name: str, n: int) -> Motion:
-        views = self._layout.views
-        return Motion(
-            views[f"{name}.position"].reshape(n, 3),
-            views[f"{name}.orientation"].reshape(n, 4),
-            views[f"{name}.linear"].reshape(n, 3),
-            views[f"{name}.angular"].reshape(n, 3),
-        )
+        self.accepted = Motion.of(self._layout.views, "accepted")
+        self.trial = Motion.of(self._layout.views, "trial")
 
     @property
     def final(self) -> bool:

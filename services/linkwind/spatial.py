@@ -7,6 +7,9 @@ centre of mass.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,6 +49,16 @@ class Motion:
         orientation = np.zeros((n, 4))
         orientation[:, 0] = 1.0
         return cls(np.zeros((n, 3)), orientation, np.zeros((n, 3)), np.zeros((n, 3)))
+
+    @classmethod
+    def of(cls, views: Mapping[str, Any], name: str) -> Motion:
+        """Return the motion that the field ``name`` of a message holds, in its memory (`linkwind.wire`)."""
+        return cls(
+            views[f"{name}.position"].reshape(-1, 3),
+            views[f"{name}.orientation"].reshape(-1, 4),
+            views[f"{name}.linear"].reshape(-1, 3),
+            views[f"{name}.angular"].reshape(-1, 3),
+        )
 
     def __len__(self) -> int:
         return len(self.position)

@@ -19,7 +19,7 @@ from linkwind.log.writer import CHUNK_SIZE, LogWriter
 from linkwind.runs.run import run
 from linkwind.scenario import load
 from linkwind.schema import MESSAGES
-from linkwind.spatial import Motion, Wrench
+from linkwind.spatial import Motion
 from linkwind.wire import FixedLayout
 from tests.log.sample import NQ, NV, N, motion_step, new_writer, record, state
 
@@ -154,7 +154,7 @@ def log_again(outcome, folder):
     path = folder / "again.mcap"
     path.unlink(missing_ok=True)
     bodies, messages = recorded.bodies, list(recorded.raw())
-    pictured = Wrench.zeros(len(bodies)), Motion.at_rest(len(bodies))
+    motion, force = Motion.at_rest(len(bodies)), np.zeros((len(bodies), 3))
     writer = LogWriter(
         path, run="again", scenario_json=scenario.to_json(), body_names=bodies,
         provider_bodies=recorded.provider_bodies, metadata={},
@@ -170,7 +170,7 @@ def log_again(outcome, folder):
                 writer.state(payload, time_ns)
             elif topic == "/step":
                 writer.step(payload, time_ns)
-                writer.scene(time_ns, pictured[1], pictured[0])
+                writer.scene(time_ns, motion, force)
             elif topic == "/timing":
                 writer.timing(payload, time_ns)
         writer.close(final_state_sha256="00")

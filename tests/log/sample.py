@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from linkwind.log.state import StateEncoder, StepEncoder, TimingEncoder
+from linkwind.log.state import StateMessage, StepEncoder, TimingEncoder
 from linkwind.log.writer import LogWriter
 from linkwind.schema import MESSAGES
 from linkwind.spatial import Motion, Wrench
@@ -77,17 +77,26 @@ def wrench_step(k, wrench):
     return message
 
 
+def encoded(message, k, time_ns, point):
+    """Fill a StateMessage and return it encoded."""
+    for name in ("position", "orientation", "linear", "angular"):
+        getattr(message.motion, name)[...] = getattr(point.motion, name)
+    for name, array in point.arrays.items():
+        message.fields[name][:] = array.ravel()
+    return message.encode(k, time_ns, **point.scalars)
+
+
 class Recorder:
     """Logs communication points and remembers every message as (topic, time, payload)."""
 
     def __init__(self, writer):
         self.writer = writer
         self.messages = []
-        self._state, self._step, self._timing = StateEncoder(N, NQ, NV), StepEncoder(3), TimingEncoder()
+        self._state, self._step, self._timing = StateMessage(N, NQ, NV), StepEncoder(3), TimingEncoder()
 
     def point(self, k, point):
         t = k * STEP_NS
-        state = self._state.encode(k, t, point.motion, **point.arrays, **point.scalars)
+        state = encoded(self._state, k, t, point)
         diagnostics = {"extrapolation_error": [0.5 * k], "residual": 2.0, "interface_energy": -0.25 * k}
         step = self._step.encode(k, t, iteration=0, order=k % 4, **diagnostics)
         messages = [

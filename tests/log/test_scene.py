@@ -38,7 +38,7 @@ def pictures(tmp_path_factory):
     scenario = json.dumps(SCENARIO | {"coupling": {"step": 0.02}})
     with new_writer(path, scenario_json=scenario) as writer:
         for k, point in enumerate(points):
-            writer.scene(k * 20 * STEP_NS, point.motion, point.wrench)
+            writer.scene(k * 20 * STEP_NS, point.motion, point.wrench.force)
         writer.close(final_state_sha256="00")
     return path, points
 
@@ -115,7 +115,7 @@ def test_arrows_are_the_forces(pictures):
 def test_a_force_that_is_no_number_is_not_drawn(force):
     wrench = Wrench.zeros(N)
     wrench.force[1] = force
-    assert Scene(SCENARIO).update(0, Motion.at_rest(N), wrench) is not None
+    assert Scene(SCENARIO).update(0, Motion.at_rest(N), wrench.force) is not None
 
 
 @pytest.mark.parametrize(
@@ -139,7 +139,7 @@ def test_pictures_are_chosen_by_counting(tmp_path):
     motion, wrench = Motion.at_rest(N), Wrench.zeros(N)
     with new_writer(tmp_path / "log.mcap") as writer:
         for k in range(101):
-            writer.scene(k * STEP_NS, motion, wrench)
+            writer.scene(k * STEP_NS, motion, wrench.force)
         writer.close(final_state_sha256="00")
     times = [time for _, time, _ in parsed(tmp_path / "log.mcap", "/tf")]
     assert times == [k * STEP_NS for k in range(0, 101, 17)]

@@ -194,7 +194,8 @@ class DynamicsService:
             )
         self._write_pending()
         self._plant.change(mechanism, scenario)
-        self.multibody = self._recorder.multibody = self._plant.multibody
+        self.multibody = self._plant.multibody
+        self._recorder.use(self.multibody)
 
     def _exchange(self, step: int, iteration: int, accepted: State, trial: State) -> Answer:
         """Post both states, write the log, return the sum of the providers' answers."""

@@ -34,7 +34,8 @@ def c_sources(part: Part, version: FmiVersion) -> dict[str, bytes]:
         f"lw_part_{'aero' if mechanism else 'dynamics'}.c",
         f"lw_fmi{other_version}.c",
         f"fmi{other_version}.h",
-        "lw_affine.c",  # to couple is the importer's
+        "lw_affine.c",  # to couple is the importer's, and so is the log
+        "lw_point.c",
     }
     root = files("linkwind").joinpath("_data", "fmu")
     absent = _absent(part) if mechanism else []

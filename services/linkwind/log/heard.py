@@ -21,7 +21,7 @@ from linkwind.log.chunks import SchemaInfo
 from linkwind.log.copies import CopyWriter
 from linkwind.log.scene import Scene
 from linkwind.schema import MESSAGES
-from linkwind.spatial import Motion, Wrench
+from linkwind.spatial import Motion
 from linkwind.wire import FixedLayout
 
 CHUNK_SIZE = 64 * 1024  # bytes; a listener that is killed loses no more
@@ -39,7 +39,7 @@ class HeardLog:
         for name, record in about.records.items():
             self._copy.record(name, dict(record))
         self._copy.scenario(about.scenario_json)
-        self._pictures = Pictures(about.scenario_json, len(json.loads(about.records[contents.RUN]["bodies"])))
+        self._pictures = Pictures(about.scenario_json)
         self._channels: dict[str, int] = {}
         self._last: Counter[str] = Counter()
         self._taken: Counter[str] = Counter()
@@ -127,10 +127,9 @@ class HeardLog:
 class Pictures:
     """What Foxglove shows of the states, as the log of a run has it."""
 
-    def __init__(self, scenario_json: str, n: int) -> None:
+    def __init__(self, scenario_json: str) -> None:
         self._scene = Scene(json.loads(scenario_json))
         self._state: tuple[int, bytes] | None = None
-        self._n = n
 
     def take(self, number: int, time_ns: int, payload: bytes) -> None:
         """Keep the ``number``-th State if a picture of it is due."""
@@ -142,18 +141,12 @@ class Pictures:
         if self._state is None:
             return
         time_ns, payload = self._state
-        self._state, n = None, self._n
+        self._state = None
         views = FixedLayout(MESSAGES["State"].FromString(payload)).views
-        motion = Motion(
-            views["motion.position"].reshape(n, 3),
-            views["motion.orientation"].reshape(n, 4),
-            views["motion.linear"].reshape(n, 3),
-            views["motion.angular"].reshape(n, 3),
-        )
-        total, wrench = Wrench.zeros(n), views["wrench"].reshape(n, 6)
-        total.force[:], total.torque[:] = wrench[:, :3], wrench[:, 3:]
+        motion = Motion.of(views, "motion")
+        force = views["wrench"].reshape(-1, 6)[:, :3]
         yield contents.TRANSFORMS, time_ns, self._scene.transforms(time_ns, motion).encode()
-        yield contents.SCENE, time_ns, self._scene.update(time_ns, motion, total).encode()
+        yield contents.SCENE, time_ns, self._scene.update(time_ns, motion, force).encode()
 
 
 def _schema(topic: str) -> SchemaInfo:

@@ -27,7 +27,7 @@ from foxglove.messages import (
 from linkwind.log.solids import drawn, solid
 from linkwind.scenario.pictures import Pictures, pictures_of
 from linkwind.scenario.shapes import AnyShape, shape_of
-from linkwind.spatial import Motion, Wrench
+from linkwind.spatial import Array, Motion
 
 FRAMES_PER_SECOND = 60.0
 FRAMES_PER_RUN = 1000
@@ -96,16 +96,16 @@ class Scene:
             )
         return FrameTransforms(transforms=frames)
 
-    def update(self, time_ns: int, motion: Motion, wrench: Wrench) -> SceneUpdate:
-        """Return the whole scene at one time; ``wrench`` is the total on every body, in W."""
+    def update(self, time_ns: int, motion: Motion, force: Array) -> SceneUpdate:
+        """Return the whole scene at one time; ``force`` [N] is the total on bodies, shape (n, 3), in W."""
         stamp, entities = timestamp(time_ns), []
-        states = zip(motion.position.tolist(), wrench.force.tolist(), strict=True)
-        for i, (position, force) in enumerate(states):
+        states = zip(motion.position.tolist(), force.tolist(), strict=True)
+        for i, (position, newtons) in enumerate(states):
             name = self._names[i]
             entities.append(
                 SceneEntity(timestamp=stamp, frame_id=name, id=name, frame_locked=True, **self._solids[i])
             )
-            arrows = self._arrows(position, force)
+            arrows = self._arrows(position, newtons)
             entities.append(SceneEntity(timestamp=stamp, frame_id="world", id=f"{name} force", arrows=arrows))
         return SceneUpdate(entities=entities)
 

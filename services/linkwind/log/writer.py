@@ -28,7 +28,7 @@ from linkwind.log import contents, grid
 from linkwind.log.scene import Scene
 from linkwind.log.sink import Sink
 from linkwind.log.versions import versions
-from linkwind.spatial import Motion, Wrench
+from linkwind.spatial import Array, Motion
 
 _log = logging.getLogger("linkwind")
 
@@ -176,19 +176,19 @@ class LogWriter:
         """Log an encoded Timing."""
         self._timing(payload, time_ns)
 
-    def scene(self, time_ns: int, motion: Motion, wrench: Wrench) -> None:
+    def scene(self, time_ns: int, motion: Motion, force: Array) -> None:
         """Log pictures for Foxglove, of every so many-th call; called once a communication point.
 
         Args:
             time_ns: simulation time [ns].
             motion: accepted poses, in W at the centres of mass.
-            wrench: total force on every body [N], in W.
+            force: total on every body [N], shape (n, 3), in W.
         """
         due = self._calls % self._scene.stride == 0
         self._calls += 1
         if due:
             self._transforms.log(self._scene.transforms(time_ns, motion), log_time=time_ns)
-            self._scenes.log(self._scene.update(time_ns, motion, wrench), log_time=time_ns)
+            self._scenes.log(self._scene.update(time_ns, motion, force), log_time=time_ns)
 
     def frame(self, provider: str, frame: FlowFrame) -> None:
         """Log a frame of the fluid that ``provider`` showed, at the frame's own time."""

@@ -19,17 +19,15 @@ from linkwind.native.multibody import (
     FORCE_TYPES,
     JOINT_TYPES,
     OCCASIONS,
-    Evaluation,
     Multibody,
     Tables,
 )
-from linkwind.spatial import Array, Motion, address
+from linkwind.spatial import Array, address
 
 _pointer = ctypes.c_void_p
 _size = declare("lw_maximal_size", [_pointer], ctypes.c_size_t)
 _attach = declare("lw_maximal_attach", [_pointer] * 3 + [ctypes.c_int32, ctypes.c_double], None)
 _start = declare("lw_maximal_start", [_pointer] * 3, None)
-_closure_reactions = declare("lw_maximal_closure_reactions", [_pointer] * 2, None)
 _coordinates = declare("lw_maximal_coordinates", [_pointer] * 4, None)
 _PLACES = [OCCASIONS[name] for name in ("position", "speed", "distance")]  # no forces are needed for these
 _TURNING = (JOINT_TYPES["revolute"], JOINT_TYPES["planar"])
@@ -81,7 +79,8 @@ class Cfe(Multibody):
         _check_events(self.tree)
         _check_motions(self.tree)
         super().__init__(_free(tables))
-        self._names = self.tree._names
+        self._names, self.closures = self.tree._names, self.tree.closures
+        self._make_room()
         self._joints = np.zeros((_size(self.tree._model) + 7) // 8)
         _attach(address(self._joints), self._model, self.tree._model, stabilisation, time)
 
@@ -98,19 +97,6 @@ class Cfe(Multibody):
         self._take(state)
         _coordinates(self._model, self._state_at, address(q), address(v))
         return q, v
-
-    def evaluate(
-        self, state: Array, wrench: Array, added_inertia: Array | None = None, *, time: float = 0.0
-    ) -> Evaluation:
-        """Return accelerations and forces, see ``Multibody``; joint accelerations are the bodies' own."""
-        result = super().evaluate(state, wrench, added_inertia, time=time)
-        reaction = np.zeros((self.tree.closures, 6))
-        _closure_reactions(self._model, address(reaction))
-        return result._replace(closure_reaction=reaction)
-
-    def joint_gap(self, motion: Motion) -> float:
-        """Return the largest distance [m] by which given poses violate a joint; see ``Multibody``."""
-        return self.tree.joint_gap(motion)
 
 
 def _check_events(tree: Multibody) -> None:

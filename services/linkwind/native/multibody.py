@@ -97,6 +97,7 @@ class Multibody:
         state_size: length of a state: q, v, the substep [s] that dopri5 would take next (0 = unknown), and
             for each event the time at which it happened [s], or ``NOT_YET``; a stop has since when its joint
             rests on it.
+        results: of the last evaluation, written over by the next.
     """
 
     def __init__(
@@ -135,7 +136,8 @@ class Multibody:
         buffers = (self._memory, self._state, self._next, self._work, self._energies)
         self._model, self._state_at, self._next_at, self._work_at, self._energies_at = map(address, buffers)
         self._fault_at = ctypes.addressof(self._fault)
-        self._results, self._evaluation = self._evaluation_of()
+        self._evaluation = ctypes.create_string_buffer(_evaluation.size)
+        self._make_room()
         self._step = ctypes.create_string_buffer(_macro_step.size)
         self._step_at = ctypes.addressof(self._step)
         self._affine = ctypes.create_string_buffer(_affine.size)
@@ -145,14 +147,11 @@ class Multibody:
         if status := _init(self._model, ctypes.addressof(native), self._fault_at):
             refuse(tables, status, self._fault.item)
 
-    def _evaluation_of(self) -> tuple[Array, ctypes.Array[ctypes.c_char]]:
-        """Return room for what ``Evaluation`` has, in the order of the struct; and that."""
-        sizes = [self.nv, 6 * self.n, 6 * self.n, 6 * self.n, self.forces, self.forces, 6 * self.closures]
-        results, starts = np.zeros(sum(sizes)), np.cumsum([0, *sizes[:-1]])
-        self._pieces = starts[1:]
-        struct = ctypes.create_string_buffer(_evaluation.size)
-        _evaluation.pack_into(struct, 0, *(address(results) + 8 * int(start) for start in starts))
-        return results, struct
+    def _make_room(self) -> None:
+        """Make room for what ``Evaluation`` has, in its order, which is that of the struct."""
+        six, force, closing = (self.n, 6), (self.forces,), (self.closures, 6)
+        self.results = Evaluation(*map(np.zeros, ((self.nv,), six, six, six, force, force, closing)))
+        _evaluation.pack_into(self._evaluation, 0, *map(address, self.results))
 
     def initial_state(self, q: Array, v: Array) -> Array:
         """Return the state with coordinates ``q``, shape (nq,), and velocities ``v``, shape (nv,).
@@ -329,9 +328,7 @@ class Multibody:
         )  # fmt: skip
         if status:
             fail(status, self._fault, self._names, {})
-        turn, *sixes, effort, power, closures = np.split(self._results.copy(), self._pieces)
-        acceleration, reaction, total = (each.reshape(-1, 6) for each in sixes)
-        return Evaluation(turn, acceleration, reaction, total, effort, power, closures.reshape(-1, 6))
+        return Evaluation(*map(np.copy, self.results))
 
     def prescribe(self, state: Array, time: float) -> Array:
         """Return a state with what motions prescribe as it is at a time [s].

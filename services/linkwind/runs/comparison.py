@@ -12,7 +12,7 @@ from linkwind.log.reader import Log
 from linkwind.mechanism import Mechanism
 from linkwind.runs.recorded import DifferError, LogEndsError, Recorded
 from linkwind.scenario import Scenario
-from linkwind.spatial import Motion, Wrench
+from linkwind.spatial import Array, Motion
 
 
 class Comparison:
@@ -46,7 +46,7 @@ class Comparison:
     def timing(self, payload: bytes, time_ns: int) -> None:
         """Wall-clock times are no result."""
 
-    def scene(self, time_ns: int, motion: Motion, wrench: Wrench) -> None:
+    def scene(self, time_ns: int, motion: Motion, force: Array) -> None:
         """Pictures follow from the states."""
 
     def frame(self, provider: str, frame: FlowFrame) -> None:

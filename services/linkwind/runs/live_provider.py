@@ -113,7 +113,7 @@ class RecordedMotion:
                         progress(motion.at[0])
                 elif topic == STATE:
                     log.state(loads.state(payload), time_ns)
-                    log.scene(time_ns, loads.motion, loads.total)
+                    log.scene(time_ns, loads.motion, loads.force)
                 elif topic == STEP:
                     log.step(payload, time_ns)
                 else:

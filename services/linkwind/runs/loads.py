@@ -35,7 +35,7 @@ class Loads:
 
     Attributes:
         motion: of the last state.
-        total: its forces and torques.
+        force: its total on every body [N], shape (n, 3), in W.
     """
 
     def __init__(self, log: Log, session: DynamicsSession) -> None:
@@ -85,21 +85,14 @@ class Loads:
         self._wrench[...] = 0.0
         for answer in self._waiting.pop(step, {}).values():
             self._add(answer)
-        np.copyto(self.total.force, self._wrench[:, :3])
-        np.copyto(self.total.torque, self._wrench[:, 3:])
         return self._layout.payload()
 
     def _prepare(self, payload: bytes) -> None:
         self._layout = FixedLayout(MESSAGES["State"].FromString(payload))
         views, n = self._layout.views, len(self._log.bodies)
-        self.motion = Motion(
-            views["motion.position"].reshape(n, 3),
-            views["motion.orientation"].reshape(n, 4),
-            views["motion.linear"].reshape(n, 3),
-            views["motion.angular"].reshape(n, 3),
-        )
-        self.total = Wrench.zeros(n)
+        self.motion = Motion.of(views, "motion")
         self._wrench = views["wrench"].reshape(n, 6)
+        self.force = self._wrench[:, :3]
         self._acceleration = views["acceleration"].reshape(n, 6)
 
     def _add(self, answer: Answered) -> None:
