@@ -26,8 +26,10 @@ Data = bytes | mmap
 Message = tuple[int, int, int, bytes]  # channel, how many-th message of it, simulation time [ns], payload
 
 _HEAD = struct.Struct("<BQ")  # opcode, length of the content
-_RECORD = struct.Struct("<BQH")  # the same, and the channel number if it is a message
-_MESSAGE = struct.Struct("<2xIQQ")  # channel number, sequence, log time, publish time (22 bytes); payload
+# The same and, if it is a message, channel number, sequence and log time; then its publish time and payload. No
+# record of a chunk is shorter than this.
+_RECORD = struct.Struct("<BQHIQ")
+_HEAD_SIZE, _PAYLOAD = _HEAD.size, _RECORD.size + 8
 _CHUNK = struct.Struct("<QQQIIQ")  # times, size, checksum, length of the compression's name (0), of the data
 
 
@@ -120,19 +122,18 @@ def messages_of(
         channels: known so far; is added to.
         wanted: the channels whose messages are returned; None for all.
     """
-    record, message = _RECORD.unpack_from, _MESSAGE.unpack_from
+    record = _RECORD.unpack_from
     found: list[Message] = []
     schemas: dict[int, SchemaInfo] = {}
     at, end = 0, len(records)
     while at < end:
-        opcode, length, channel = record(records, at)
-        at += _HEAD.size
+        opcode, length, channel, sequence, time_ns = record(records, at)
+        behind = at + _HEAD_SIZE + length
         if opcode != MESSAGE:
-            add_channel(opcode, records[at : at + length], schemas, channels)
+            add_channel(opcode, records[at + _HEAD_SIZE : behind], schemas, channels)
         elif wanted is None or channel in wanted:
-            sequence, time_ns, _ = message(records, at)
-            found.append((channel, sequence, time_ns, records[at + 22 : at + length]))
-        at += length
+            found.append((channel, sequence, time_ns, records[at + _PAYLOAD : behind]))
+        at = behind
     return found
 
 
@@ -141,9 +142,8 @@ def places_of(records: bytes) -> dict[int, list[tuple[int, int]]]:
     found: dict[int, list[tuple[int, int]]] = {}
     at, end = 0, len(records)
     while at < end:
-        opcode, length, channel = _RECORD.unpack_from(records, at)
+        opcode, length, channel, _, time_ns = _RECORD.unpack_from(records, at)
         if opcode == MESSAGE:
-            _, time_ns, _ = _MESSAGE.unpack_from(records, at + _HEAD.size)
             found.setdefault(channel, []).append((time_ns, at))
         at += _HEAD.size + length
     return found

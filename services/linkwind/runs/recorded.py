@@ -38,7 +38,7 @@ class Recorded:
     """
 
     def __init__(self, log: Log, topic: str) -> None:
-        self._messages = log.messages(topic)
+        self._messages = log.of_topic(topic)
         self._number = 0
         self.next: Message | None = next(self._messages, None)
 
