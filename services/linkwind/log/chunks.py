@@ -26,8 +26,8 @@ Data = bytes | mmap
 Message = tuple[int, int, int, bytes]  # channel, how many-th message of it, simulation time [ns], payload
 
 _HEAD = struct.Struct("<BQ")  # opcode, length of the content
-# The same and, if it is a message, channel number, sequence and log time; then its publish time and payload. No
-# record of a chunk is shorter than this.
+# The same and, if it is a message, channel number, sequence and log time; its publish time and payload follow.
+# No record of a chunk is shorter than this.
 _RECORD = struct.Struct("<BQHIQ")
 _HEAD_SIZE, _PAYLOAD = _HEAD.size, _RECORD.size + 8
 _CHUNK = struct.Struct("<QQQIIQ")  # times, size, checksum, length of the compression's name (0), of the data
