@@ -6,6 +6,7 @@ copy of the buffer and decoding a copy into it; the schema is ``schemas/linkwind
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Sequence
 
 from google.protobuf.message import DecodeError
@@ -22,16 +23,32 @@ def _zeros(count: int) -> list[float]:
     return [0.0] * count
 
 
-class _Message:
-    """A message of fixed layout with the scalars that every exchange carries."""
+_STAMP = struct.Struct(
+    "<QBIBQ"
+)  # step, iteration and time_ns, which follow each other, with the tags between
 
-    __slots__ = ("_iteration", "_layout", "_name", "_step", "_time_ns")
+
+class _Message:
+    """A message of fixed layout with the scalars that every exchange carries.
+
+    Attributes:
+        at: which exchange it belongs to: index of the communication point, coupling iteration.
+        time_ns: simulation time of the communication point [ns].
+    """
+
+    __slots__ = ("_layout", "_name", "_stamp_at", "_tags", "at", "time_ns")
 
     def __init__(self, name: str, **fields: object) -> None:
         self._name = name
         self._layout = FixedLayout(MESSAGES[name](**fields))
-        views = self._layout.views
-        self._step, self._iteration, self._time_ns = views["step"], views["iteration"], views["time_ns"]
+        self._stamp_at = self._layout.regions["step"].offset
+        _, first, _, second, _ = _STAMP.unpack_from(self._layout.buffer, self._stamp_at)
+        self._tags = first, second
+        self._read_stamp()
+
+    def _read_stamp(self) -> None:
+        step, _, iteration, _, self.time_ns = _STAMP.unpack_from(self._layout.buffer, self._stamp_at)
+        self.at: tuple[int, int] = step, iteration
 
     def payload(self) -> bytes:
         """Return the encoded message."""
@@ -48,28 +65,20 @@ class _Message:
             ProtocolError: it is not such a message, or is of another run, sender or size.
         """
         if self._layout.load(payload):
+            self._read_stamp()
             return
         try:
             message = MESSAGES[self._name].FromString(payload)
             self._layout.fill(message)
+            self._read_stamp()
         except (DecodeError, ValueError) as error:
             raise ProtocolError(f"{what}: expected a {self._name} of this run; got {error}") from error
 
     def stamp(self, step: int, iteration: int, time_ns: int) -> None:
         """Set which exchange this message belongs to."""
-        self._step[0] = step
-        self._iteration[0] = iteration
-        self._time_ns[0] = time_ns
-
-    @property
-    def at(self) -> tuple[int, int]:
-        """Which exchange this message belongs to: index of the communication point, coupling iteration."""
-        return self._step.item(), self._iteration.item()
-
-    @property
-    def time_ns(self) -> int:
-        """Simulation time of the communication point [ns]."""
-        return int(self._time_ns.item())
+        first, second = self._tags
+        _STAMP.pack_into(self._layout.buffer, self._stamp_at, step, first, iteration, second, time_ns)
+        self.at, self.time_ns = (step, iteration), time_ns
 
 
 class MotionMessage(_Message):

@@ -51,6 +51,8 @@ class MechanismPlant:
 
     def _begin(self, state: State) -> Array:
         """Return the values to advance from: those of the state, with what is ordered for it."""
+        if not self._orders:
+            return state.values
         due = [event for event, step in self._orders.items() if step == state.step]
         if not due:
             return state.values

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import platform
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -11,13 +12,16 @@ DISTRIBUTIONS = ("linkwind", "numpy", "eclipse-zenoh", "protobuf", "foxglove-sdk
 
 def versions() -> dict[str, str]:
     """Return the version of Python and of every package that a result may depend on, and the machine."""
-    found = {"python": platform.python_version(), "platform": platform.platform(), "cpu": processor()}
-    for name in DISTRIBUTIONS:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:  # run from a source tree that is not installed
-            found[name] = "not installed"
-    return found
+    machine = {"python": platform.python_version(), "platform": platform.platform(), "cpu": processor()}
+    return machine | {name: _installed(name) for name in DISTRIBUTIONS}
+
+
+@functools.cache
+def _installed(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:  # run from a source tree that is not installed
+        return "not installed"
 
 
 def processor() -> str:

@@ -207,7 +207,9 @@ class DynamicsSession(HandShake):
         """Add up all responses, each at the rows and columns of its bodies; return whether there is any."""
         if self._only is not None:
             response = self._only.answer.response
-            if response is not None and response.ndim == 2:
+            if response is None:
+                return False
+            if response.ndim == 2:
                 np.copyto(self._response, response)
                 return True
         responses = [(p.bodies, p.answer.response) for p in self.participants.values()]
