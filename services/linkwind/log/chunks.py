@@ -26,7 +26,7 @@ Data = bytes | mmap
 Message = tuple[int, int, int, bytes]  # channel, how many-th message of it, simulation time [ns], payload
 
 _HEAD = struct.Struct("<BQ")  # opcode, length of the content
-# The same and, if it is a message, channel number, sequence and log time; its publish time and payload follow.
+# The same and, if it is a message, channel number, sequence and log time; publish time and payload follow.
 # No record of a chunk is shorter than this.
 _RECORD = struct.Struct("<BQHIQ")
 _HEAD_SIZE, _PAYLOAD = _HEAD.size, _RECORD.size + 8
