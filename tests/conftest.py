@@ -8,6 +8,7 @@ SLOW = (
     "tests/docker/test_stay.py",
     "tests/faults/test_disk.py::test_slow_disk",
     "tests/faults/test_killed_and_resumed.py",
+    "tests/faults/test_restarted.py",
     "tests/fmi/test_platforms.py",
     "tests/fmi_host/test_wine.py",
     "tests/fmu/test_c_fuzz.py",

@@ -31,7 +31,7 @@ from linkwind.runs.diff import diff
 from linkwind.runs.listen import Recording, listen_to
 from linkwind.runs.playback import Steering
 from linkwind.runs.replay import Selection, replay
-from linkwind.runs.run import dynamics
+from linkwind.runs.run import Ends, dynamics
 from linkwind.runs.verify import scenario_of, verify
 from linkwind.scenario import load
 from tests.runs.edit import rewrite
@@ -74,8 +74,7 @@ def fly(
     before = parts.get("before", lambda: None)
     provider = Job(lambda: (before(), provide(endpoint)))
     try:
-        ends = {"listen": [endpoint], "connect": []}
-        dynamics(scenario, folder, lambda step: None, run_id="r", **ends, listened=listened)
+        dynamics(scenario, folder, lambda step: None, Ends([endpoint], []), run_id="r", listened=listened)
     finally:
         provider.done()
     return open_log(folder / "log.mcap")
@@ -181,7 +180,7 @@ def test_a_run_that_awaits_its_listener(tmp_path: Path) -> None:
     with pytest.raises(LostError, match=r"nobody listened within 0\.3 s \(bus\.start_timeout\)"):
         dynamics(
             load("two_link", settings), tmp_path / "alone", lambda step: None,
-            run_id="r", listen=[alone], connect=[], listened=True,
+            Ends([alone], []), run_id="r", listened=True,
         )  # fmt: skip
 
 
@@ -384,9 +383,8 @@ def run_beside_a_stranger(folder: Path, settings: list[str]) -> tuple[Log, Stran
             load("two_link_flow", settings),
             folder,
             lambda step: None,
+            Ends([theirs], [mine]),
             run_id="r",
-            listen=[theirs],
-            connect=[mine],
         )
         answering.done()
         wait_until(lambda: [kind for _, kind in stranger.present].count("SampleKind.DELETE") == 2)

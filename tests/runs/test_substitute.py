@@ -20,7 +20,7 @@ from linkwind.runs.keeping import Kept
 from linkwind.runs.live_dynamics import answer_dynamics, live_dynamics
 from linkwind.runs.live_provider import Answered, live_provider
 from linkwind.runs.resume import plan
-from linkwind.runs.run import dynamics, run
+from linkwind.runs.run import Ends, dynamics, run
 from linkwind.runs.substitution import changed
 from linkwind.runs.verify import scenario_of, verify
 from linkwind.scenario import load
@@ -247,9 +247,7 @@ def test_dynamics_elsewhere(log: Log, tmp_path: Path) -> None:
     thread = threading.Thread(target=lambda: answered.append(answer_dynamics(log, [], [endpoint])))
     thread.start()
     scenario = load("two_link", [f"time.end={STEPS / 1000}"])
-    done = dynamics(
-        scenario, tmp_path / "out", lambda step: None, run_id="there", listen=[endpoint], connect=[]
-    )
+    done = dynamics(scenario, tmp_path / "out", lambda step: None, Ends([endpoint], []), run_id="there")
     thread.join(10.0)
     assert answered == [STEPS]
     assert done.result.final_state_sha256 == log.final_state_sha256

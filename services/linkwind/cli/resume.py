@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from linkwind.cli.force_fmu import ForceFmuOption, files_by_provider, refuse_missing
-from linkwind.cli.options import JsonOption, LogArgument, OutOption, SetOption, TlsOption
-from linkwind.cli.run import behind_a_bar, print_summary
+from linkwind.cli.options import (
+    ConnectOption,
+    JsonOption,
+    ListenOption,
+    LogArgument,
+    OutOption,
+    SetOption,
+    TlsOption,
+)
+from linkwind.cli.run import behind_a_bar, meeting, print_summary, tell_plan
 from linkwind.cli.view import LOCAL, HostOption, NoOpenOption, PortOption, ViewOption, watched
+from linkwind.errors import InputError
 
 if TYPE_CHECKING:
-    from linkwind.runs.resume import Plan
+    from linkwind.runs.resume import Resumed
+    from linkwind.runs.run import Progress
 
 
 def register(app: typer.Typer) -> None:
@@ -34,6 +45,8 @@ def resume(
     set_: SetOption = None,
     out: OutOption = None,
     force_fmu: ForceFmuOption = None,
+    listen: ListenOption = None,
+    connect: ConnectOption = None,
     tls: TlsOption = None,
     view: ViewOption = False,
     host: HostOption = LOCAL,
@@ -46,32 +59,38 @@ def resume(
     Example: linkwind resume runs/two_link-20260101-120000/log.mcap
 
     Example: linkwind resume LOG --from-step 600 --set environment.gravity="[0, -1.62, 0]"
+
+    Example: linkwind resume LOG --listen tcp/0.0.0.0:7447    # providers come from elsewhere
     """
     from linkwind.log.reader import open_log
-    from linkwind.runs.resume import plan
+    from linkwind.runs.resume import plan, resume_elsewhere
     from linkwind.runs.resume import resume as resume_run
 
     found = plan(open_log(log), from_step, set_ or [])
     files = files_by_provider(found.scenario, force_fmu or [])
-    refuse_missing(found.scenario, files)
+    ends = None
+    if listen or connect:
+        _refuse(files)
+        ends = meeting(found.scenario, listen, connect, tls, quiet=as_json)
+    else:
+        refuse_missing(found.scenario, files)
+
+    def job(progress: Progress) -> Resumed:
+        if ends is not None:
+            return resume_elsewhere(found, out, progress, ends, watch)
+        return resume_run(found, out, progress, files, tls, watch)
+
     with watched(view, host, port, no_open) as watch:
         if as_json:
-            typer.echo(json.dumps(resume_run(found, out, files=files, tls=tls, watch=watch).as_json()))
+            typer.echo(json.dumps(job(lambda step: None).as_json()))
         else:
-            _tell(found)
-            print_summary(
-                behind_a_bar(
-                    found.scenario.name,
-                    found.steps,
-                    lambda progress: resume_run(found, out, progress, files, tls, watch).outcome,
-                )
-            )
+            tell_plan(found)
+            print_summary(behind_a_bar(found.scenario.name, found.steps, job))
 
 
-def _tell(found: Plan) -> None:
-    """Print where a run goes on."""
-    damage = found.log.damage
-    if damage is not None:
-        typer.echo(f"note: the log is not complete: {damage.text}")
-    begin = f"a checkpoint of step {found.start}" if found.start >= 0 else "the beginning"
-    typer.echo(f"goes on after step {found.last} of {found.steps}; providers start from {begin}")
+def _refuse(files: dict[str, Path]) -> None:
+    if files:
+        raise InputError(
+            "--force-fmu: expected the FMU where the provider runs, which is elsewhere with --listen or "
+            "--connect; got it here. Give it to linkwind aero there."
+        )

@@ -23,8 +23,12 @@ from linkwind.cli.options import (
 from linkwind.cli.view import LOCAL, HostOption, NoOpenOption, PortOption, ViewOption, watched
 
 if TYPE_CHECKING:
-    from linkwind.runs.run import Outcome, Progress
+    from linkwind.runs.restart import Finished
+    from linkwind.runs.resume import Plan, Resumed
+    from linkwind.runs.run import Ends, Outcome, Progress
     from linkwind.scenario import Scenario
+
+    Summary = Outcome | Resumed | Finished
 
 T = TypeVar("T")
 
@@ -83,36 +87,66 @@ def dynamics(
     await_listener: Annotated[
         bool, typer.Option("--await-listener", help="Begin when somebody listens (linkwind record).")
     ] = False,
+    resume: Annotated[
+        bool,
+        typer.Option(
+            "--resume",
+            help="Go on with the run in --out, or the newest under runs/, if it was cut; else begin.",
+        ),
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Start the dynamics alone; the providers connect from elsewhere.
 
     Example: linkwind dynamics two_link --listen tcp/0.0.0.0:7447
+
+    Example: until linkwind dynamics two_link --out runs/mine --resume; do sleep 1; done
     """
-    from linkwind.credentials import identity_in
+    from linkwind.runs.restart import restart
     from linkwind.runs.run import dynamics as run_dynamics
     from linkwind.scenario import load
 
     loaded = load(scenario, set_ or [])
+    ends = meeting(loaded, listen, connect, tls, quiet=as_json)
+
+    def job(progress: Progress) -> Summary:
+        how: dict[str, Any] = {"run_id": run_id, "watch": watch, "listened": await_listener}
+        if resume:
+            tell = (lambda found: None) if as_json else tell_plan
+            return restart(loaded, out, progress, ends, goes_on=tell, **how)
+        return run_dynamics(loaded, out, progress, ends, **how)
+
+    with watched(view, host, port, no_open) as watch:
+        _show(loaded, job, as_json=as_json)
+
+
+def meeting(
+    scenario: Scenario, listen: list[str] | None, connect: list[str] | None, tls: Path | None, *, quiet: bool
+) -> Ends:
+    """Return where a dynamics meets its providers; tell how they get there."""
+    from linkwind.credentials import identity_in
+    from linkwind.runs.run import Ends
+
     shown = identity_in(tls, "dynamics")
     if not listen and not connect:
         listen = [default_endpoint(tls)]
-    if not as_json:
-        for provider in loaded.providers:
-            where = (listen or connect or [""])[0].replace("0.0.0.0", "THIS-MACHINE")
-            options = f"--connect {where} --name {provider.name}" + (" --tls DIR" if tls else "")
-            typer.echo(f"waiting for {provider.name}: linkwind aero {options}")
-    ends: dict[str, Any] = {"listen": listen or [], "connect": connect or [], "identity": shown}
-    ends["listened"] = await_listener
-    with watched(view, host, port, no_open) as watch:
-        _show(
-            loaded,
-            lambda progress: run_dynamics(loaded, out, progress, run_id=run_id, watch=watch, **ends),
-            as_json=as_json,
-        )
+    for provider in () if quiet else scenario.providers:
+        where = (listen or connect or [""])[0].replace("0.0.0.0", "THIS-MACHINE")
+        options = f"--connect {where} --name {provider.name}" + (" --tls DIR" if tls else "")
+        typer.echo(f"waiting for {provider.name}: linkwind aero {options}")
+    return Ends(listen or [], connect or [], shown)
 
 
-def _show(scenario: Scenario, job: Callable[[Progress], Outcome], *, as_json: bool) -> None:
+def tell_plan(found: Plan) -> None:
+    """Print where a run goes on."""
+    damage = found.log.damage
+    if damage is not None:
+        typer.echo(f"note: the log is not complete: {damage.text}")
+    begin = f"a checkpoint of step {found.start}" if found.start >= 0 else "the beginning"
+    typer.echo(f"goes on after step {found.last} of {found.steps}; providers start from {begin}")
+
+
+def _show(scenario: Scenario, job: Callable[[Progress], Summary], *, as_json: bool) -> None:
     """Do the job behind a progress bar and print its summary."""
     if as_json:
         typer.echo(json.dumps(job(lambda step: None).as_json()))
@@ -145,8 +179,23 @@ def _happened(at: float | None) -> str:
     return "did not happen" if at is None else f"at {at:.9g} s"
 
 
-def print_summary(outcome: Outcome) -> None:
+def print_summary(done: Summary) -> None:
     """Print what a run came to."""
+    from linkwind.runs.restart import Finished
+    from linkwind.runs.resume import Resumed
+
+    if isinstance(done, Finished):
+        state = done.log.final_state_sha256
+        typer.echo(
+            f"{done.log.path}: this run has come to its end, step {done.log.steps}: nothing is left to do"
+        )
+        typer.echo(f"{'final state':>26}  {state}")
+        typer.echo(f"{'report':>26}  {done.report}")
+        return
+    _print_outcome(done.outcome if isinstance(done, Resumed) else done)
+
+
+def _print_outcome(outcome: Outcome) -> None:
     summary = outcome.as_json()
     exchange, gap = summary["exchange_us"], summary["joint_gap_max_m"]
     rows = {

@@ -8,9 +8,11 @@ from pathlib import Path
 
 from linkwind.errors import LogError
 from linkwind.log import contents
-from linkwind.log.chunks import MAGIC, ChannelInfo
+from linkwind.log.chunks import MAGIC, ChannelInfo, record_at
 from linkwind.log.facts import Damage
 from linkwind.log.scan import Contents
+
+LARGEST_HEADER = 1000  # bytes of MCAP's own first record, and more
 
 
 class Head:
@@ -145,3 +147,11 @@ def check_magic(path: Path) -> None:
     if start != MAGIC:
         got = f"a file that starts with {start!r}" if start else "an empty file"
         raise LogError(f"{path}: expected an MCAP file; got {got}. Give the log.mcap of a linkwind run.")
+
+
+def is_blank(path: Path) -> bool:
+    """Tell whether a file is a log whose writer was killed before it had said what it is of."""
+    with path.open("rb") as file:
+        start = file.read(LARGEST_HEADER)
+    whole = len(start) == LARGEST_HEADER or record_at(start, len(MAGIC)) is not None
+    return not whole and MAGIC.startswith(start[: len(MAGIC)])

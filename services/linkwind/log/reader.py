@@ -46,6 +46,11 @@ class Log(Head):
         self.topics = {self.channels[number].topic: counts[number] for number in sorted(counts)}
         self.check_schemas(self.channels.values())
 
+    def close(self) -> None:
+        """Let go of the file, which may be gone already; nothing can be read any more."""
+        if not isinstance(self._data, bytes):
+            self._data.close()
+
     def _counts(self) -> dict[int, int]:
         """Return the readable messages by channel, and find out the damage."""
         gaps, written = self._contents.gaps, self._contents.counts

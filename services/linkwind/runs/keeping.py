@@ -15,6 +15,8 @@ from linkwind.log.writer import LogWriter
 
 T = TypeVar("T")
 
+LOG, REPORT = "log.mcap", "report.html"
+
 
 @dataclass(frozen=True)
 class Kept(Generic[T]):
@@ -49,7 +51,7 @@ def keep(
     Raises:
         LinkwindError: the job's, with the places of the files.
     """
-    log, report = folder / "log.mcap", folder / "report.html"
+    log, report = folder / LOG, folder / REPORT
     try:
         with terminate_as_interrupt(), closing(link), new_log(log) as writer:
             result = job(writer)

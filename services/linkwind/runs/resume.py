@@ -27,8 +27,9 @@ from linkwind.runs import folder as folders
 from linkwind.runs.changes import split
 from linkwind.runs.comparison import Comparison, finder
 from linkwind.runs.record import Record, checkpoint_steps, last_step, states_at
-from linkwind.runs.run import Beginning, Outcome, Progress, with_providers
+from linkwind.runs.run import Beginning, Ends, Outcome, Progress, with_elsewhere, with_providers
 from linkwind.runs.splice import ContinuedLog, SplicedLink
+from linkwind.runs.successor import Successor
 from linkwind.runs.verify import orders_of
 from linkwind.runs.watch import Watch
 from linkwind.scenario import Scenario, from_json
@@ -42,7 +43,7 @@ class Plan:
         log: of the run.
         scenario: from the beginning on.
         changes: scenarios that count after a step, by that step.
-        last: K, the last step that is taken from the log.
+        last: K, the last step that is taken from the log; -1 for none.
         start: K0, the step that the providers have a checkpoint of; -1 for the beginning.
     """
 
@@ -151,6 +152,45 @@ def resume(
         MismatchError: what was recorded does not come out again here.
         LinkwindError: the run ended early; its log and report tell as well.
     """
+    service, beginning = _continued(found)
+    folder = folders.create(found.scenario.name, out)
+    return Resumed(with_providers(service, folder, progress, files, beginning, tls, watch), found)
+
+
+def resume_elsewhere(
+    found: Plan, out: Path | None, progress: Progress, ends: Ends, watch: Watch | None = None
+) -> Resumed:
+    """Go on with a run, with providers that are started elsewhere; see :func:`resume`.
+
+    Args:
+        found: where and how.
+        out: folder for the results; None for a new one under ``runs/``.
+        progress: is told now and then how many steps are done, those from the log included.
+        ends: where they meet.
+        watch: shows the run, and holds it; None for nobody.
+    """
+    service, beginning = _continued(found)
+    folder = folders.create(found.scenario.name, out)
+    return Resumed(with_elsewhere(service, folder, progress, ends, beginning, watch), found)
+
+
+def resume_here(found: Plan, progress: Progress, ends: Ends, watch: Watch | None = None) -> Resumed:
+    """Go on with a run in its own folder, with providers that are started elsewhere; see :func:`resume`.
+
+    The new log takes the place of the old one as soon as it holds as much (:mod:`linkwind.runs.successor`).
+    """
+    successor = Successor(found.log, lambda: watch is None or watch.opened)
+    service, beginning = _continued(found, successor)
+    try:
+        return Resumed(
+            with_elsewhere(service, found.log.path.parent, progress, ends, beginning, watch), found
+        )
+    finally:
+        successor.end()
+
+
+def _continued(found: Plan, successor: Successor | None = None) -> tuple[DynamicsService, Beginning]:
+    """Return the dynamics of a run that goes on, and what stands in front of it."""
     log, scenario, step_ns = found.log, found.scenario, found.scenario.coupling.step_ns
     mechanism = build(scenario)
     for each in (scenario, *found.changes.values()):
@@ -168,16 +208,14 @@ def resume(
 
     def new_log(writer: LogWriter) -> ContinuedLog:
         comparison = Comparison(log, scenario, mechanism, wrenches=False)
-        return ContinuedLog(writer, record, comparison, found.last, step_ns)
+        return ContinuedLog(writer, record, comparison, found.last, step_ns, successor)
 
-    beginning = Beginning(_metadata(found), link, new_log)
-    folder = folders.create(scenario.name, out)
-    return Resumed(with_providers(service, folder, progress, files, beginning, tls, watch), found)
+    return service, Beginning(_metadata(found), link, new_log, successor)
 
 
 def _metadata(found: Plan) -> dict[str, str]:
     """Return what the new log says of where it comes from."""
-    record = {"resumed_run": found.log.run, RESUMED_STEP: str(found.last)}
+    record = {"resumed_run": found.log.run, RESUMED_STEP: str(found.last)} if found.last >= 0 else {}
     if found.changes:
         changes = {str(step): changed.to_json() for step, changed in found.changes.items()}
         record[CHANGES] = json.dumps(changes)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -19,11 +19,12 @@ from linkwind.dynamics.service import DynamicsService, Result
 from linkwind.errors import InputError, LostError, ScenarioError
 from linkwind.listening import description
 from linkwind.log.writer import LogWriter
-from linkwind.mechanism import build
+from linkwind.mechanism import Mechanism, build
 from linkwind.native.library import library_sha256
 from linkwind.runs import folder as folders
 from linkwind.runs.here import providers_here, zenoh_link
 from linkwind.runs.keeping import keep
+from linkwind.runs.successor import Successor
 from linkwind.runs.watch import Watch
 from linkwind.scenario import Scenario
 
@@ -74,6 +75,21 @@ Progress = Callable[[int], None]
 
 
 @dataclass(frozen=True)
+class Ends:
+    """Where a dynamics meets providers that are started elsewhere.
+
+    Attributes:
+        listen: zenoh endpoints to listen on.
+        connect: zenoh endpoints to connect to.
+        identity: the dynamics' certificate; None without TLS.
+    """
+
+    listen: Sequence[str]
+    connect: Sequence[str]
+    identity: Identity | None = None
+
+
+@dataclass(frozen=True)
 class Beginning:
     """What a run made from a log puts in front of the bus and of the new log; the new log says so.
 
@@ -81,11 +97,14 @@ class Beginning:
         metadata: for the new log.
         link: puts something in front of the bus.
         log: puts something in front of the new log.
+        successor: what the new log is until it takes the place of the one in the same folder; None if there
+            is none.
     """
 
     metadata: Mapping[str, str]
     link: Callable[[DynamicsLink], DynamicsLink] = lambda link: link
     log: Callable[[LogWriter], MessageLog] = lambda writer: writer
+    successor: Successor | None = None
 
 
 NEW = Beginning({})
@@ -112,12 +131,22 @@ def run(
     Raises:
         LinkwindError: the run ended early; its log and report tell as well.
     """
-    mechanism = build(scenario)
-    methods.check(mechanism, scenario)
-    aero.check(scenario)
+    mechanism = checked(scenario)
     folder = folders.create(scenario.name, out)
     service = DynamicsService(scenario, mechanism, folders.run_id(folder))
     return with_providers(service, folder, progress, files, tls=tls, watch=watch)
+
+
+def checked(scenario: Scenario) -> Mechanism:
+    """Return the mechanism of a scenario.
+
+    Raises:
+        InputError: it makes no mechanism, or no run.
+    """
+    mechanism = build(scenario)
+    methods.check(mechanism, scenario)
+    aero.check(scenario)
+    return mechanism
 
 
 def with_providers(
@@ -138,11 +167,9 @@ def dynamics(
     scenario: Scenario,
     out: Path | None,
     progress: Progress,
+    ends: Ends,
     *,
-    run_id: str,
-    listen: Sequence[str],
-    connect: Sequence[str],
-    identity: Identity | None = None,
+    run_id: str = "",
     watch: Watch | None = None,
     listened: bool = False,
 ) -> Outcome:
@@ -152,10 +179,8 @@ def dynamics(
         scenario: what to run.
         out: folder for the results; None for a new one under ``runs/``.
         progress: is told now and then how many steps are done.
+        ends: where they meet.
         run_id: id of the run; empty for the folder's name.
-        listen: zenoh endpoints to listen on.
-        connect: zenoh endpoints to connect to.
-        identity: the dynamics' certificate; None without TLS.
         watch: who looks at the run while it goes on, if anybody.
         listened: do not begin before somebody listens to all of the log.
 
@@ -163,22 +188,36 @@ def dynamics(
         LostError: nobody listens within bus.start_timeout.
         ScenarioError: the scenario wants everything in one process.
     """
-    if scenario.bus.transport == "inprocess":
-        raise ScenarioError(
-            f'{scenario.source}: bus.transport: expected "zenoh", to meet providers that are started '
-            'elsewhere; got "inprocess". Use: linkwind run'
-        )
-    mechanism = build(scenario)
-    methods.check(mechanism, scenario)
-    aero.check(scenario)
+    mechanism = checked(scenario)
     folder = folders.create(scenario.name, out)
     service = DynamicsService(scenario, mechanism, run_id or folders.run_id(folder))
+    return with_elsewhere(service, folder, progress, ends, watch=watch, listened=listened)
+
+
+def with_elsewhere(
+    service: DynamicsService,
+    folder: Path,
+    progress: Progress,
+    ends: Ends,
+    beginning: Beginning = NEW,
+    watch: Watch | None = None,
+    *,
+    listened: bool = False,
+) -> Outcome:
+    """Run a service with providers that are started elsewhere; see :func:`dynamics`."""
+    scenario = service.scenario
     try:
-        link = zenoh_link(service.session, scenario, listen, connect, identity)
+        if scenario.bus.transport == "inprocess":
+            raise ScenarioError(
+                f'{scenario.source}: bus.transport: expected "zenoh", to meet providers that are started '
+                'elsewhere; got "inprocess". Use: linkwind run'
+            )
+        link = zenoh_link(service.session, scenario, ends.listen, ends.connect, ends.identity)
     except InputError:
-        folder.rmdir()
+        with suppress(OSError):  # there is a log from before
+            folder.rmdir()
         raise
-    return drive(service, folder, progress, link, watch=watch, listened=listened)
+    return drive(service, folder, progress, link, beginning=beginning, watch=watch, listened=listened)
 
 
 def drive(
@@ -193,6 +232,7 @@ def drive(
     listened: bool = False,
 ) -> Outcome:
     """Run the service over an open end of the bus, close that, and keep the log; see :func:`run`."""
+    successor = beginning.successor
 
     def job(writer: LogWriter) -> Result:
         if watch is not None:
@@ -201,10 +241,16 @@ def drive(
         with _heard(beginning.log(writer), writer, link, service, listened=listened) as log:
             recorder = Recorder(log, service.scenario, service.mechanism, service.multibody)
             result = service.run(beginning.link(link), recorder, progress, poll)
+            if successor is not None:
+                successor.replace(writer)
             writer.close(final_state_sha256=result.final_state_sha256)
         return result
 
-    kept = keep(folder, link, lambda path: _new_log(path, service, beginning.metadata), job)
+    def new_log(path: Path) -> LogWriter:
+        path = path if successor is None else successor.path
+        return _new_log(path, service, beginning.metadata)
+
+    kept = keep(folder, link, new_log, job)
     return Outcome(
         service.scenario.name, kept.result, kept.log, kept.report, kept.report_trouble, kept.log_trouble
     )

@@ -22,6 +22,7 @@ from linkwind.protocol import DynamicsSession
 from linkwind.runs.comparison import Comparison
 from linkwind.runs.record import Exchange, Record
 from linkwind.runs.recorded import DifferError, LogEndsError
+from linkwind.runs.successor import Successor
 from linkwind.schema import MESSAGES
 
 
@@ -102,11 +103,18 @@ class ContinuedLog:
     """Where the messages of a resumed run go (:class:`~linkwind.dynamics.recorder.MessageLog`): a new log."""
 
     def __init__(
-        self, log: LogWriter, record: Record, comparison: Comparison, last: int, step_ns: int
+        self,
+        log: LogWriter,
+        record: Record,
+        comparison: Comparison,
+        last: int,
+        step_ns: int,
+        successor: Successor | None = None,
     ) -> None:
         """Write to ``log``; up to the step ``last``, compare and take from the record what the run lacks."""
         self._log, self._record, self._comparison = log, record, comparison
         self._last_ns = last * step_ns
+        self._successor = successor
         self.scene, self.diagnostics, self.wrench = log.scene, log.diagnostics, log.wrench
 
     def motion(self, payload: bytes, time_ns: int) -> None:
@@ -114,6 +122,8 @@ class ContinuedLog:
         if self._record.current is not None:
             self._compare(self._comparison.motion, payload, time_ns)
         self._log.motion(payload, time_ns)
+        if self._successor is not None:
+            self._successor.reached(self._log, time_ns)
 
     def state(self, payload: bytes, time_ns: int) -> None:
         """Write an accepted state."""

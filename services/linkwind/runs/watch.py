@@ -25,7 +25,11 @@ PATIENCE = 5.0  # s for the server to end
 
 
 class Watch:
-    """What viewers make a run wait for."""
+    """What viewers make a run wait for.
+
+    Attributes:
+        opened: whether the server has opened the log, or is gone.
+    """
 
     def __init__(self, host: str, port: int, announce: Callable[[str], None]) -> None:
         """Watch a run that is about to begin.
@@ -41,6 +45,7 @@ class Watch:
         self._passed = -1
         self._rate, self._origin_ns, self._origin = 0.0, 0, 0.0
         self._server: subprocess.Popen[str] | None = None
+        self.opened = False
 
     def begin(self, log: LogWriter) -> None:
         """Serve the page of a log that the run has begun."""
@@ -55,11 +60,13 @@ class Watch:
         for line in lines:
             told = json.loads(line)
             if "url" in told:
+                self.opened = True
                 self._announce(told["url"])
             elif "viewers" in told:
                 log.flush_interval = WATCHED_INTERVAL if told["viewers"] else FLUSH_INTERVAL
             else:
                 self._steer(told)
+        self.opened = True
         log.flush_interval = FLUSH_INTERVAL
         self._steer({"paused": False, "rate": 0.0})
 
