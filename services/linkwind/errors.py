@@ -80,7 +80,15 @@ class ProtocolError(ParticipantError):
 
 
 class LostError(ParticipantError):
-    """A participant died, was stopped, or never came."""
+    """A participant died, was stopped, or never came.
+
+    Attributes:
+        provider: that was lost in the middle of a run and may come back; empty if that is no question.
+    """
+
+    def __init__(self, text: str, provider: str = "") -> None:
+        super().__init__(text)
+        self.provider = provider
 
 
 class AnswerTimeoutError(ParticipantError):

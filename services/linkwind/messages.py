@@ -74,6 +74,10 @@ class _Message:
         except (DecodeError, ValueError) as error:
             raise ProtocolError(f"{what}: expected a {self._name} of this run; got {error}") from error
 
+    def fits(self, other: _Message) -> bool:
+        """Tell whether another message has the same layout."""
+        return self._layout.fits(other._layout)
+
     def stamp(self, step: int, iteration: int, time_ns: int) -> None:
         """Set which exchange this message belongs to."""
         first, second = self._tags

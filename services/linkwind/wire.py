@@ -171,6 +171,10 @@ class FixedLayout:
         self.buffer[:] = data
         return True
 
+    def fits(self, other: FixedLayout) -> bool:
+        """Tell whether messages of another layout can be loaded."""
+        return other.size == self.size and self._unpack(other.template) == self._expected
+
     def fill(self, message: Any) -> None:
         """Take over the values of a parsed message, whatever encoding it came in.
 

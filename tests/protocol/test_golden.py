@@ -49,6 +49,8 @@ def vectors() -> dict[str, tuple[str, dict[str, Any]]]:
         "flow_frame": ("FlowFrame", flow_frame()),
         "checkpoint": ("Checkpoint", checkpoint()),
         "welcome_resume": ("Control", {"welcome": welcome()}),
+        "welcome_catch_up": ("Control", {"welcome": welcome() | {"catchUp": catch_up()}}),
+        "ready_answers": ("Control", {"ready": ready()}),
         "description": ("Description", {"run": "golden", "scenarioJson": "{}", "records": [ABOUT]}),
         "ending": ("Ending", {"records": [ABOUT], "counts": [{"topic": "/motion", "messages": "1202"}]}),
         "playback_seek": ("Playback", {"paused": True, "timeNs": "120000000"}),
@@ -74,6 +76,21 @@ def welcome() -> dict[str, Any]:
         "bodies": ["link1", "link2"], "providerBodies": ["link2"], "checkpointEvery": "40",
         "resume": {"step": "120", "state": checkpoint()["state"], "number": "3"},
         "changes": [{"step": "500", "scenarioJson": "{}"}],
+    }  # fmt: skip
+
+
+def catch_up() -> dict[str, Any]:
+    """A provider that was lost after its answers to two motions; here three bytes each."""
+    motions = [base64.b64encode(bytes([step, 0, 255])).decode() for step in (121, 122)]
+    return {"motions": motions, "frames": "4", "framesTaken": "5", "checkpointsTaken": "3"}
+
+
+def ready() -> dict[str, Any]:
+    """Of that provider."""
+    answers = hashlib.sha256(b"".join(hashlib.sha256(bytes([n])).digest() for n in (1, 2))).digest()
+    return {
+        "name": "aero", "instance": "j", "kind": "WRENCH_KIND_POINT", "rollback": True,
+        "answersSha256": base64.b64encode(answers).decode(),
     }  # fmt: skip
 
 

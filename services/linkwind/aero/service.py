@@ -53,6 +53,7 @@ def serve(link: ProviderLink, provider: ProviderSession, start_timeout: float) -
     try:
         provider.build()
         link.join(provider.run)
+        provider.catch_up()
         provider.started(link.request(provider.ready(), start_timeout))
         while provider.state is not ProviderState.DONE:
             answer = provider.answer(link.receive())

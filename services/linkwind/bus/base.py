@@ -52,6 +52,9 @@ class DynamicsLink(Protocol):
 
         Returns:
             whether ``done`` holds.
+
+        Raises:
+            LostError: see :meth:`receive`.
         """
         ...
 
@@ -59,11 +62,15 @@ class DynamicsLink(Protocol):
         """Send a motion message to every provider."""
         ...
 
+    def repeat(self, motion: bytes) -> None:
+        """Send the last motion message again, for a provider that came back."""
+        ...
+
     def receive(self) -> tuple[str, bytes]:
         """Return the next wrench message and the provider that it came from.
 
         Raises:
-            LostError: a provider died or was stopped.
+            LostError: a provider died or was stopped; told once, here or by :meth:`wait`.
             AnswerTimeoutError: a provider is alive but has not answered in time.
             FaultError: a provider reported that it cannot go on.
         """

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 
 from linkwind.bus.base import DynamicsLink
 from linkwind.dynamics.recorder import MessageLog
+from linkwind.dynamics.recovery import NO_PATIENCE, Patience, Recovery
 from linkwind.errors import LostError, StoppedError
 from linkwind.log.state import TimingEncoder
 from linkwind.protocol import DynamicsSession, fault
@@ -20,11 +21,31 @@ GOODBYE_TIMEOUT = 5.0  # s that a provider may take to commit the last state and
 
 
 class Exchanges:
-    """The providers of a run, behind a link; everything that is exchanged goes to the log."""
+    """The providers of a run, behind a link; everything that is exchanged goes to the log.
 
-    def __init__(self, session: DynamicsSession, link: DynamicsLink, log: MessageLog) -> None:
-        """Exchange over ``link``, an open end of the bus that answers control requests with ``session``."""
-        self._session, self._link, self._log = session, link, log
+    Attributes:
+        recovery: of providers that are lost on the way.
+    """
+
+    def __init__(
+        self,
+        session: DynamicsSession,
+        link: DynamicsLink,
+        log: MessageLog,
+        poll: Callable[[], None] = lambda: None,
+        patience: Patience = NO_PATIENCE,
+    ) -> None:
+        """Prepare.
+
+        Args:
+            session: the protocol's state.
+            link: an open end of the bus that answers control requests with it.
+            log: takes everything that is exchanged.
+            poll: is called now and then while waiting for providers to come and go; may raise to give up.
+            patience: with providers that are lost.
+        """
+        self._session, self._link, self._log, self._poll = session, link, log, poll
+        self.recovery = Recovery(session, link, patience, poll)
         self._timing = TimingEncoder()
 
     @contextmanager
@@ -44,18 +65,14 @@ class Exchanges:
             self._link.fault(fault("dynamics", *self._session.motion.at, error))
             raise
 
-    def await_providers(self, timeout: float, poll: Callable[[], None]) -> None:
-        """Wait until every provider is ready.
-
-        Args:
-            timeout: [s].
-            poll: is called now and then; may raise to give up.
+    def await_providers(self, timeout: float) -> None:
+        """Wait until every provider is ready; [s].
 
         Raises:
             LostError: a provider did not come.
         """
         session = self._session
-        if not self._link.wait(lambda: not session.not_ready, timeout, poll):
+        if not self._wait(lambda: not session.not_ready, timeout):
             missing = " and ".join(f'"{name}"' for name in session.not_ready)
             raise LostError(
                 f"{missing} did not come within {timeout:g} s (bus.start_timeout). Start it with: "
@@ -76,7 +93,7 @@ class Exchanges:
         meanwhile()
         log.motion(payload, time_ns)
         while not session.answered:
-            provider, answer = link.receive()
+            provider, answer = self._receive(payload)
             if session.accept(provider, answer):
                 log.wrench(provider, answer, time_ns)
         took = time.perf_counter_ns() - start
@@ -84,17 +101,37 @@ class Exchanges:
         self._take_shown()
         return took
 
+    def _receive(self, payload: bytes) -> tuple[str, bytes]:
+        """Return the next wrench message and its provider; a loss on the way is made good."""
+        while True:
+            try:
+                return self._link.receive()
+            except LostError as loss:
+                self.recovery.bring_back(loss)
+                self._link.repeat(payload)
+
+    def _wait(self, done: Callable[[], bool], timeout: float, payload: bytes = b"") -> bool:
+        """Wait until ``done`` holds, like the link; a loss on the way is made good, with the last motion."""
+        while True:
+            try:
+                return self._link.wait(done, timeout, self._poll)
+            except LostError as loss:
+                self.recovery.bring_back(loss)
+                if payload:
+                    self._link.repeat(payload)
+
     def _take_shown(self) -> None:
         """Write frames and checkpoints that came with the last answers: after all of these, in one order."""
         for provider, payload in sorted(self._link.checkpoints(), key=lambda sent: sent[0]):
-            time_ns = self._session.checkpoint(provider, payload).time_ns
-            self._log.checkpoint(provider, payload, time_ns)
+            checkpoint = self._session.checkpoint(provider, payload)
+            if checkpoint is not None:
+                self._log.checkpoint(provider, payload, checkpoint.time_ns)
         for provider, payload in sorted(self._link.frames(), key=lambda sent: sent[0]):
-            self._log.frame(provider, self._session.frame(provider, payload))
+            frame = self._session.frame(provider, payload)
+            if frame is not None:
+                self._log.frame(provider, frame)
 
-    def say_goodbye(
-        self, payload: bytes, poll: Callable[[], None], meanwhile: Callable[[], None] = lambda: None
-    ) -> None:
+    def say_goodbye(self, payload: bytes, meanwhile: Callable[[], None] = lambda: None) -> None:
         """Send the last motion and wait for every Bye; see :meth:`ask`.
 
         Raises:
@@ -104,7 +141,7 @@ class Exchanges:
         self._link.post(payload)
         meanwhile()
         self._log.motion(payload, session.motion.time_ns)
-        if not self._link.wait(lambda: not session.not_gone, GOODBYE_TIMEOUT, poll):
+        if not self._wait(lambda: not session.not_gone, GOODBYE_TIMEOUT, payload):
             missing = " and ".join(f'"{name}"' for name in session.not_gone)
             raise LostError(f"{missing} did not say Bye within {GOODBYE_TIMEOUT:g} s of the last step")
         self._take_shown()

@@ -9,7 +9,18 @@ from types import TracebackType
 from linkwind.bus.base import LogStream
 from linkwind.frames import FlowFrame
 from linkwind.listening import ending
-from linkwind.log.contents import CHECKPOINT, DIAGNOSTICS, END, FLOW, MOTION, STATE, STEP, TIMING, WRENCH
+from linkwind.log.contents import (
+    CHECKPOINT,
+    DIAGNOSTICS,
+    END,
+    FLOW,
+    MOTION,
+    RETURNS,
+    STATE,
+    STEP,
+    TIMING,
+    WRENCH,
+)
 from linkwind.log.writer import LogWriter
 
 
@@ -74,6 +85,7 @@ class PublishedLog:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._log.close(error=error)
-        later = {name: self._log.records[name] for name in (DIAGNOSTICS, END) if name in self._log.records}
+        records = self._log.records
+        later = {name: records[name] for name in (DIAGNOSTICS, RETURNS, END) if name in records}
         self._stream.end(ending(later, self._numbers))
         self._stream.linger()

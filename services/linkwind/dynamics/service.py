@@ -16,6 +16,7 @@ from linkwind.coupling import SCHEMES, Answer, CommunicationPoint, Settings
 from linkwind.dynamics.exchanges import Exchanges
 from linkwind.dynamics.plant import MechanismPlant, State, acceleration_weight
 from linkwind.dynamics.recorder import Recorder
+from linkwind.dynamics.recovery import Patience, Return
 from linkwind.dynamics.timing import ExchangeTimes
 from linkwind.errors import ScenarioError
 from linkwind.mechanism import Mechanism, build
@@ -36,6 +37,7 @@ class Result:
         joint_gap_max_m: largest distance of two joint points, from the poses; None without joints [m].
         force_max_N: largest aerodynamic force on a body [N].
         events: when each event happened [s]; None: it did not.
+        returns: of providers that were lost and came back.
         final_state_sha256: of the last accepted poses and twists, little-endian float64, body by body.
     """
 
@@ -46,6 +48,7 @@ class Result:
     joint_gap_max_m: float | None
     force_max_N: float  # noqa: N815  the unit's symbol
     events: dict[str, float | None]
+    returns: tuple[Return, ...]
     final_state_sha256: str
 
 
@@ -59,6 +62,7 @@ class DynamicsService:
         live_from: the first step whose exchange is timed.
         hold: is called before a step with its number, and may wait; what else it is given writes to the log
             what has been accepted. None for nothing.
+        returned: is told of each provider that was lost and came back.
     """
 
     def __init__(
@@ -82,6 +86,7 @@ class DynamicsService:
         self._steps = [scenario, *(changed for changed, _ in self._changes.values())][-1].steps
         self.live_from = 0
         self.hold: Callable[[int, Callable[[], None]], None] | None = None
+        self.returned: Callable[[Return], None] = lambda back: None
         self.session = DynamicsSession(
             run=run,
             scenario_json=scenario.to_json(),
@@ -91,7 +96,8 @@ class DynamicsService:
             providers={p.name: p.bodies for p in scenario.providers},
         )
         texts = {step: changed.to_json() for step, changed in changes.items()}
-        self.session.course = Course(scenario.log.checkpoint_every, changes=texts)
+        recovery = scenario.bus.recovery > 0.0
+        self.session.course = Course(scenario.checkpoint_every, changes=texts, recovery=recovery)
         self.scenario = scenario
         self.mechanism = mechanism
         self._plant = MechanismPlant(mechanism, scenario, self.session.where)
@@ -123,14 +129,17 @@ class DynamicsService:
             StoppedError: Ctrl-C or SIGTERM.
         """
         self._recorder = recorder
-        self._exchanges = Exchanges(self.session, link, recorder.log)
+        bus, timeout = self.scenario.bus, self.scenario.coupling.timeout
+        patience = Patience(bus.recovery, bus.start_timeout, timeout)
+        self._exchanges = Exchanges(self.session, link, recorder.log, poll, patience)
+        self._exchanges.recovery.returned = self.returned
         # A state that blows up is stopped by the core, with a reason; the log shows the way there.
         with self._exchanges.ended_for_all(), np.errstate(over="ignore", invalid="ignore"):
-            self._exchanges.await_providers(self.scenario.bus.start_timeout, poll)
+            self._exchanges.await_providers(bus.start_timeout)
             start = time.perf_counter()
             final = self._march(progress)
             wall = time.perf_counter() - start
-            self._say_goodbye(final, poll)
+            self._say_goodbye(final)
         return Result(
             steps=self._steps,
             exchanges=self._exchanged,
@@ -139,6 +148,7 @@ class DynamicsService:
             joint_gap_max_m=recorder.joint_gap_max if self.mechanism.has_joints else None,
             force_max_N=recorder.force_max,
             events=self._happened(final),
+            returns=tuple(self._exchanges.recovery.returns),
             final_state_sha256=digest(self.session.motion.accepted),
         )
 
@@ -214,12 +224,12 @@ class DynamicsService:
         while self._pending:
             self._recorder.point(self._pending.popleft())
 
-    def _say_goodbye(self, final: State, poll: Callable[[], None]) -> None:
+    def _say_goodbye(self, final: State) -> None:
         motion = self.session.motion
         self._plant.multibody.motion(final.values, motion.accepted)
         self._plant.multibody.motion(final.values, motion.trial)
         payload = self.session.post(self._steps, 0, final=True)
-        self._exchanges.say_goodbye(payload, poll, self._write_pending)
+        self._exchanges.say_goodbye(payload, self._write_pending)
 
 
 def digest(motion: Motion) -> str:

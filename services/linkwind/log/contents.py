@@ -1,7 +1,7 @@
 """What a linkwind log holds, by the names that its writer and its reader share.
 
 Topics carry the messages of ``schemas/linkwind/v1``; ``log_time`` is simulation time [ns]. Beside them
-the file has the resolved scenario as an attachment and three metadata records.
+the file has the resolved scenario as an attachment and metadata records.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ SCENARIO = "scenario.json"  # attachment: the resolved scenario
 RUN = "linkwind"  # metadata: run id, bodies, schema hash and what the caller adds
 VERSIONS = "linkwind.versions"  # metadata: versions of the programs, processor
 DIAGNOSTICS = "linkwind.diagnostics"  # metadata: names of each provider's own numbers; missing without any
+RETURNS = "linkwind.returns"  # metadata: providers that were lost and came back; missing without any
 HEARD = "linkwind.heard"  # metadata: what a listener has missed; missing in a log of the dynamics' own
 END = "linkwind.end"  # metadata: how the run ended; missing when the writer was killed
 

@@ -1,7 +1,8 @@
-"""Where the run of a log comes from, for people, if not from its scenario alone."""
+"""Where the run of a log comes from, for people, and what it came through, if not from its scenario alone."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 
 from linkwind.log import contents
@@ -16,6 +17,10 @@ def origin(log: Log) -> Iterator[str]:
         yield f"resumed after step {metadata[contents.RESUMED_STEP]} of run {metadata['resumed_run']}"
     for step in log.changes:
         yield f"other settings count after step {step}"
+    for text in log.record(contents.RETURNS).values():
+        back = json.loads(text)
+        name, step, after_s = back["provider"], back["step"], back["after_s"]
+        yield f'"{name}" was lost at step {step} and came back after {after_s:.1f} s'
     if log.heard:
         yield "heard on the bus by linkwind record"
     live = metadata.get(contents.SUBSTITUTED)

@@ -211,6 +211,15 @@ class LogWriter:
         if record:
             self._write_record(contents.DIAGNOSTICS, record)
 
+    def returned(self, provider: str, step: int, after_s: float) -> None:
+        """Record that a provider was lost at a step and came back after some time [s].
+
+        The last such record of a log has those before in it.
+        """
+        before = self.records.get(contents.RETURNS, {})
+        back = {"provider": provider, "step": step, "after_s": after_s}
+        self._write_record(contents.RETURNS, before | {str(len(before) + 1): json.dumps(back)})
+
     def flush(self) -> None:
         """Bring every message so far into the file, where a killed process leaves it.
 

@@ -35,6 +35,7 @@ class DynamicsSession(HandShake):
         super().__init__(run, scenario_json, step_ns, steps, bodies, providers)
         n = len(bodies)
         self.motion = MotionMessage(run, n)
+        self._posted = b""
         self._waiting = 0
         self._numbers = np.zeros(42 * n)
         self._wrench = self._numbers[: 6 * n].reshape(n, 6)
@@ -65,7 +66,8 @@ class DynamicsSession(HandShake):
         if final:
             self.motion.final = True
         self._ask()
-        return self.motion.payload()
+        self._posted = self.motion.payload()
+        return self._posted
 
     def _ask(self) -> None:
         for p in self.participants.values():
@@ -80,6 +82,7 @@ class DynamicsSession(HandShake):
         """
         self.motion.load(payload, "motion to send again")
         self._ask()
+        self._posted = payload
 
     def end(self) -> bytes:
         """Return the message that ends the run with the accepted state of the last motion."""
@@ -113,31 +116,39 @@ class DynamicsSession(HandShake):
             )
         known.answered = True
         known.payload = payload
+        if known.past is not None:
+            known.past.add(at[0], self._posted, payload)
         self._waiting -= 1
         return True
 
-    def frame(self, provider: str, payload: bytes) -> FlowFrame:
-        """Take a frame.
+    def frame(self, provider: str, payload: bytes) -> FlowFrame | None:
+        """Take a frame; None if a provider that came back has sent it again.
 
         Raises:
             ProtocolError: unknown provider, not a frame of this run, or one before it was lost.
         """
         known = self._sender(provider, "frame")
         number, frame = frames.decode(payload, self.run, provider)
+        if known.losses and number <= known.frames:
+            return None
         self._check_number("frame", provider, known.frames + 1, number)
         known.frames = number
         return frame
 
-    def checkpoint(self, provider: str, payload: bytes) -> Checkpoint:
-        """Take a checkpoint.
+    def checkpoint(self, provider: str, payload: bytes) -> Checkpoint | None:
+        """Take a checkpoint; None if a provider that came back has sent it again.
 
         Raises:
             ProtocolError: unknown provider, not a checkpoint of this run, or one before it was lost.
         """
         known = self._sender(provider, "checkpoint")
         number, checkpoint = checkpoints.decode(payload, self.run, provider)
+        if known.losses and number <= known.checkpoints:
+            return None
         self._check_number("checkpoint", provider, known.checkpoints + 1, number)
         known.checkpoints = number
+        if known.past is not None:
+            known.past.save(number, checkpoint, known.frames)
         return checkpoint
 
     def _sender(self, provider: str, what: str) -> Participant:

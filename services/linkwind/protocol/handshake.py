@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from linkwind import __version__
-from linkwind.errors import LinkwindError, ParticipantError, RefusedError
+from linkwind.errors import LinkwindError, LostError, MismatchError, RefusedError
 from linkwind.messages import KINDS, WrenchMessage
 from linkwind.protocol.control import Control, fault_error, parse, refuse
+from linkwind.protocol.past import Past
 from linkwind.schema import SHA256
 from linkwind.spatial import Wrench
 
@@ -33,6 +34,8 @@ class Participant:
     shown: int = 0  # sent, as Bye says
     checkpoints: int = 0  # taken so far
     saved: int = 0  # sent, as Bye says
+    losses: int = 0
+    past: Past | None = None  # what it needs to come back; None if it never can
 
     @property
     def answer(self) -> Wrench:
@@ -50,12 +53,14 @@ class Course:
         start: the step that the providers begin after, with ``states``; -1 for the beginning.
         states: what each provider had saved then, and the number of that checkpoint.
         changes: scenarios (JSON) that count from the motion of step + 1 on, by step.
+        recovery: whether a provider that was lost may come back; then there have to be checkpoints.
     """
 
     checkpoint_every: int = 0
     start: int = -1
     states: Mapping[str, tuple[int, bytes]] = field(default_factory=dict)
     changes: Mapping[int, str] = field(default_factory=dict)
+    recovery: bool = False
 
 
 class HandShake:
@@ -117,7 +122,7 @@ class HandShake:
             message = parse(request, "hello", "ready", "bye", "fault", "order")
             self._check_asker(message, asker)
             reply = getattr(self, "_on_" + message.WhichOneof("body"))(message)
-        except ParticipantError as error:
+        except LinkwindError as error:
             reply = Control(refuse={"reason": str(error)})
         return bytes(reply.SerializeToString())
 
@@ -151,6 +156,8 @@ class HandShake:
             )
             self.failure = RefusedError(reason)
             raise self.failure
+        if known.message is None:
+            self._begin(known)
         known.instance = hello.instance
         body = {
             "run": self.run,
@@ -160,18 +167,48 @@ class HandShake:
             "bodies": self.bodies,
             "provider_bodies": [self.bodies[i] for i in known.bodies],
         }
-        return Control(welcome=body | self._course(known.name))
+        return Control(welcome=body | self._course(known))
 
-    def _course(self, provider: str) -> dict[str, Any]:
+    def _begin(self, known: Participant) -> None:
+        """Let a provider begin where the run does."""
         course = self.course
+        number, state = course.states[known.name] if course.start >= 0 else (0, b"")
+        known.checkpoints = max(0, number - 1)
+        if course.recovery:
+            known.past = Past(course.checkpoint_every, course.start, number, state)
+
+    def _course(self, known: Participant) -> dict[str, Any]:
+        course, past = self.course, known.past
         changes = [{"step": step, "scenario_json": text} for step, text in sorted(course.changes.items())]
         body: dict[str, Any] = {"checkpoint_every": course.checkpoint_every, "changes": changes}
-        if course.start >= 0:
-            number, state = course.states[provider]
+        if past is not None and past.step >= 0:
+            body["resume"] = {"step": past.step, "state": past.state, "number": past.number}
+        elif course.start >= 0:
+            number, state = course.states[known.name]
             body["resume"] = {"step": course.start, "state": state, "number": number}
-            if not self.participants[provider].ready:
-                self.participants[provider].checkpoints = number - 1
+        if known.losses and past is not None:
+            body["catch_up"] = {
+                "motions": [answered.motion for answered in past.answers],
+                "frames": past.frames,
+                "frames_taken": known.frames,
+                "checkpoints_taken": known.checkpoints,
+            }
         return body
+
+    def lose(self, name: str) -> None:
+        """Let another process take the place of a provider that is gone.
+
+        Nothing of it is accepted before that has said Ready; see also :attr:`Course.recovery`.
+
+        Raises:
+            LostError: none can.
+        """
+        known = self.participants[name]
+        if known.payload and (known.past is None or known.past.torn):
+            why = "sent no checkpoint when one was due" if known.rollback else "cannot save its memory"
+            raise LostError(f'"{name}" cannot come back (bus.recovery): it {why}')
+        known.ready, known.instance = False, ""
+        known.losses += 1
 
     def _on_ready(self, message: Any) -> Any:
         ready = message.ready
@@ -185,20 +222,46 @@ class HandShake:
                 f"bodies; got {ready.response_size}"
             )
             raise self.failure
-        known.kind = {number: kind for kind, number in KINDS.items()}.get(ready.kind, "point")
-        known.rollback = ready.rollback
-        known.diagnostics = tuple(ready.diagnostics)
-        known.message = WrenchMessage(
+        kind = {number: kind for kind, number in KINDS.items()}.get(ready.kind, "point")
+        message = WrenchMessage(
             self.run,
             known.name,
             n,
-            kind=known.kind,
+            kind=kind,
             added_inertia=ready.added_inertia,
             response_size=ready.response_size,
-            diagnostics=known.diagnostics,
+            diagnostics=tuple(ready.diagnostics),
         )
+        if known.payload:
+            self._check_again(known, ready, message)
+        else:
+            known.kind, known.rollback, known.message = kind, ready.rollback, message
+            known.diagnostics = tuple(ready.diagnostics)
+        if not known.rollback:
+            known.past = None
         known.ready = True
         return Control(start={})
+
+    def _check_again(self, known: Participant, ready: Any, message: WrenchMessage) -> None:
+        """Hold a provider that came back against the one that was lost.
+
+        Raises:
+            MismatchError: it is another one.
+        """
+        past, trouble = known.past, ""
+        assert past is not None
+        assert known.message is not None
+        if not known.message.fits(message) or known.diagnostics != tuple(ready.diagnostics):
+            trouble = "answers of the same form as before; got others"
+        elif ready.answers_sha256 != past.sha256:
+            steps = f"steps {past.answers[0].step} to {past.answers[-1].step}" if past.answers else "no step"
+            trouble = f"the answers to {steps} that it gave before it was lost; got others"
+        if trouble:
+            self.failure = MismatchError(
+                f'"{known.name}" came back, but is not what was lost: expected {trouble}. Is it the same '
+                "program, with the same files, on the same kind of machine?"
+            )
+            raise self.failure
 
     def _on_bye(self, message: Any) -> Any:
         if message.bye.name in self.participants:

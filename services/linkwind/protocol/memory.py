@@ -72,6 +72,7 @@ class Memory:
                 self.close()
                 raise
         self._checkpoints: list[bytes] = []
+        self._taken = int(welcome.catch_up.checkpoints_taken)
         self.saved = 0 if resume is None else int(resume.number) - 1
 
     def committed(self, step: int, time_ns: int) -> None:
@@ -89,7 +90,9 @@ class Memory:
             self._every = 0
             return
         self.saved += 1
-        self._checkpoints.append(Checkpoint(step, time_ns, state).encode(self._run, self._name, self.saved))
+        if self.saved > self._taken:
+            checkpoint = Checkpoint(step, time_ns, state)
+            self._checkpoints.append(checkpoint.encode(self._run, self._name, self.saved))
 
     def _change(self, step: int, scenario_json: str) -> None:
         """Go on with a model of another scenario that has the memory of this one."""

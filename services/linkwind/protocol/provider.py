@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import logging
 import uuid
 from collections.abc import Callable
@@ -13,6 +14,7 @@ from linkwind.frames import FlowFrame
 from linkwind.messages import KINDS, MotionMessage, WrenchMessage
 from linkwind.protocol.control import Control, fault, parse
 from linkwind.protocol.memory import Memory, Model
+from linkwind.protocol.past import digest
 from linkwind.schema import SHA256
 
 _log = logging.getLogger("linkwind")
@@ -28,7 +30,10 @@ class ProviderState(Enum):
 
 
 class ProviderSession:
-    """A provider's side of the protocol: hello → welcome → ready → (motion → wrench)* → bye."""
+    """A provider's side of the protocol: hello → welcome → ready → (motion → wrench)* → bye.
+
+    One that comes back in the middle of a run answers what it has answered already between welcome and ready.
+    """
 
     def __init__(self, name: str, build: Callable[[str, str], Model]) -> None:
         """Prepare to take part.
@@ -46,7 +51,9 @@ class ProviderSession:
         self._memory: Memory | None = None
         self._frames: list[bytes] = []
         self._shown = 0
+        self._taken = 0
         self._answer = b""
+        self._answers_sha256 = b""
 
     def hello(self) -> bytes:
         """Return the message that asks to take part."""
@@ -96,6 +103,20 @@ class ProviderSession:
             diagnostics=can.diagnostics,
         )
 
+    def catch_up(self) -> None:
+        """Answer what another process of this provider has answered before it was lost, to have its memory.
+
+        Raises:
+            ProtocolError: the motions are not those that follow its checkpoint.
+            SimulationError: the model failed.
+        """
+        if not self._welcome.HasField("catch_up"):
+            return
+        past = self._welcome.catch_up
+        self._shown, self._taken = int(past.frames), int(past.frames_taken)
+        answers = (self.answer(motion) or b"" for motion in past.motions)
+        self._answers_sha256 = digest(hashlib.sha256(answer).digest() for answer in answers)
+
     def _use(self, model: Model) -> None:
         self._model = model
         self._frame: Callable[[], FlowFrame | None] = getattr(model, "frame", lambda: None)
@@ -112,6 +133,7 @@ class ProviderSession:
             "response_size": can.response_size,
             "own_step_ns": can.own_step_ns,
             "diagnostics": can.diagnostics,
+            "answers_sha256": self._answers_sha256,
         }
         return bytes(Control(ready=body).SerializeToString())
 
@@ -165,7 +187,8 @@ class ProviderSession:
                 f"got {frame.time_ns}"
             )
         self._shown += 1
-        self._frames.append(frame.encode(self.run, self.name, self._shown))
+        if self._shown > self._taken:
+            self._frames.append(frame.encode(self.run, self.name, self._shown))
 
     def frames(self) -> list[bytes]:
         """Take what the last :meth:`answer` has to show besides: to be sent before the answer itself."""

@@ -35,13 +35,13 @@ def providers_here(
 
     Yields:
         The dynamics' end of the bus, to be closed; and what raises LostError once a process has ended with
-        an error.
+        an error, or, with bus.recovery, starts it again.
     """
     if scenario.bus.transport == "inprocess":
         yield inprocess_link(session, files), lambda: None
         return
     link, endpoint = _listen_here(session, scenario, tls)
-    with children(folder) as providers:
+    with children(folder, session) as providers:
         for name in session.providers:
             arguments = ["aero", "--connect", endpoint, "--name", name, "--run", session.run]
             if tls:

@@ -97,10 +97,10 @@ class RecordedMotion:
             LinkwindError: the provider did not come, cannot go on, or was lost.
         """
         session, motion = self.session, self.session.motion
-        exchanges, loads = Exchanges(session, link, log), Loads(self._log, session)
+        exchanges, loads = Exchanges(session, link, log, poll), Loads(self._log, session)
         asked, stride = 0, max(1, self._steps // 200)
         with exchanges.ended_for_all():
-            exchanges.await_providers(self._scenario.bus.start_timeout, poll)
+            exchanges.await_providers(self._scenario.bus.start_timeout)
             for topic, time_ns, payload in self._recorded():
                 if topic == MOTION:
                     session.repeat(payload)
@@ -120,7 +120,7 @@ class RecordedMotion:
                     loads.recorded(topic.removeprefix(WRENCH), payload)
                     log.wrench(topic.removeprefix(WRENCH), payload, time_ns)
             missing = self._missing()
-            exchanges.say_goodbye(session.end(), poll)
+            exchanges.say_goodbye(session.end())
         return Answered(motion.at[0], asked, missing, digest(motion.accepted))
 
     def _recorded(self) -> Iterator[tuple[str, int, bytes]]:

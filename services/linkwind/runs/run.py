@@ -64,6 +64,7 @@ class Outcome:
             "joint_gap_max_m": result.joint_gap_max_m,
             "force_max_N": result.force_max_N,
             "events": result.events,
+            "returns": [back._asdict() for back in result.returns],
             "final_state_sha256": result.final_state_sha256,
             "log": str(self.log),
             "log_trouble": self.log_trouble or None,
@@ -235,6 +236,7 @@ def drive(
     successor = beginning.successor
 
     def job(writer: LogWriter) -> Result:
+        service.returned = lambda back: writer.returned(*back)
         if watch is not None:
             watch.begin(writer)
             service.hold = _holding(watch, service, writer, poll)

@@ -53,7 +53,7 @@ class SplicedLink:
         self._recorded: deque[tuple[str, bytes]] = deque()
         self._behind: Exchange | None = None  # the recorded exchange that the providers do again
         self._live = False
-        self.wait, self.fault, self.close = link.wait, link.fault, link.close
+        self.wait, self.repeat, self.fault, self.close = link.wait, link.repeat, link.fault, link.close
         self.frames, self.checkpoints, self.listeners = link.frames, link.checkpoints, link.listeners
 
     def post(self, motion: bytes) -> None:

@@ -13,7 +13,16 @@ from linkwind.scenario.forces import Force
 from linkwind.scenario.problems import ProblemError
 from linkwind.scenario.providers import Provider
 from linkwind.scenario.quantities import Section
-from linkwind.scenario.settings import Bus, Coupling, Dynamics, Environment, Logging, Time, nanoseconds
+from linkwind.scenario.settings import (
+    RECOVERY_STEPS,
+    Bus,
+    Coupling,
+    Dynamics,
+    Environment,
+    Logging,
+    Time,
+    nanoseconds,
+)
 
 
 class Scenario(Section):
@@ -88,6 +97,11 @@ class Scenario(Section):
     def steps(self) -> int:
         """Number of communication steps."""
         return self.end_ns // self.coupling.step_ns
+
+    @property
+    def checkpoint_every(self) -> int:
+        """Steps from one checkpoint of the providers to the next; 0 for none."""
+        return self.log.checkpoint_every or (RECOVERY_STEPS if self.bus.recovery else 0)
 
     @property
     def commands(self) -> tuple[str, ...]:

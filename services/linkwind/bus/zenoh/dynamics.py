@@ -24,7 +24,7 @@ from linkwind.errors import AnswerTimeoutError, LinkwindError, LostError
 SPIN = 200e-6 if len(os.sched_getaffinity(0)) > 1 else 0.0
 FRAMES = 64  # that may wait for the dynamics, which takes them at every exchange
 PAUSE = 0.005  # s between two looks while providers come and go
-FIRST_RESEND = 0.5  # s; the first motion may be lost while declarations still travel
+FIRST_RESEND = 0.5  # s; the first motion to a provider may be lost while declarations still travel
 
 
 class Exchanging(Protocol):
@@ -74,7 +74,7 @@ class ZenohDynamicsLink(Endpoint):
         self._timeout = timeout
         self._posted_at = float("inf")
         self._waiting_since = float("inf")
-        self._first_motion = b""
+        self._unsure_motion = b""
         self._resend_at: float | None = None
         self._asking = threading.Lock()
         # Before the wrenches' own: whoever can send a wrench can send a frame.
@@ -104,7 +104,8 @@ class ZenohDynamicsLink(Endpoint):
             self._fail(
                 LostError(
                     f'"{name}" was lost at {self._exchanging.where()}: its process ended, was stopped for '
-                    f"more than {LEASE:g} s, or the network was cut. Look at its output"
+                    f"more than {LEASE:g} s, or the network was cut. Look at its output",
+                    name,
                 )
             )
 
@@ -112,7 +113,7 @@ class ZenohDynamicsLink(Endpoint):
         now, resend_at = time.monotonic(), self._resend_at
         if resend_at is not None and now > resend_at:
             self._resend_at = now + 2.0 * (now - self._posted_at)
-            self._outgoing.put(self._first_motion)
+            self._outgoing.put(self._unsure_motion)
         if now - self._waiting_since > self._timeout:
             late = " and ".join(f'"{name}"' for name in self._exchanging.unanswered)
             self._fail(
@@ -126,8 +127,8 @@ class ZenohDynamicsLink(Endpoint):
         """Wait until ``done`` holds; see :class:`linkwind.bus.base.DynamicsLink`."""
         end = time.monotonic() + timeout
         while not done():
-            if self._trouble is not None:
-                raise self._trouble
+            if self._troubles:
+                self._raise()
             if time.monotonic() > end:
                 return False
             # Not a condition variable: a signal in the middle of one leaves it in pieces.
@@ -139,11 +140,17 @@ class ZenohDynamicsLink(Endpoint):
     def post(self, motion: bytes) -> None:
         """Send a motion message to every provider."""
         self._resend_at = None
-        if not self._first_motion:
-            self._first_motion = motion
-            self._posted_at = time.monotonic()
-            self._resend_at = self._posted_at + FIRST_RESEND
+        if not self._unsure_motion:
+            self.repeat(motion)
+        else:
+            self._outgoing.put(motion)
+
+    def repeat(self, motion: bytes) -> None:
+        """Send a motion that may have to be sent once more; see :class:`~linkwind.bus.base.DynamicsLink`."""
+        self._unsure_motion = motion
+        self._posted_at = time.monotonic()
         self._outgoing.put(motion)
+        self._resend_at = self._posted_at + FIRST_RESEND
 
     def listeners(self, topics: Sequence[str], description: bytes) -> ZenohLogStream:
         """Let others listen to the log; see :class:`~linkwind.bus.base.DynamicsLink`."""
@@ -157,9 +164,10 @@ class ZenohDynamicsLink(Endpoint):
         """Return the next wrench message and its provider; see :class:`~linkwind.bus.base.DynamicsLink`."""
         # The provider's time to answer runs while the dynamics waits, not while it writes its log.
         self._waiting_since = time.monotonic()
-        sample = self._receive(SPIN)
-        self._waiting_since = float("inf")
-        return _named(sample)
+        try:
+            return _named(self._receive(SPIN))
+        finally:
+            self._waiting_since = float("inf")
 
     def frames(self) -> list[tuple[str, bytes]]:
         """Take the frames that have come; see :class:`~linkwind.bus.base.DynamicsLink`.

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import deque
 from collections.abc import Sequence
+from typing import NoReturn
 
 import zenoh
 from zenoh.handlers import FifoChannel
@@ -12,7 +14,7 @@ from zenoh.handlers import FifoChannel
 from linkwind.bus.base import PREFIX
 from linkwind.bus.zenoh.diagnosis import Doubt
 from linkwind.bus.zenoh.session import Security, open_session
-from linkwind.errors import LinkwindError
+from linkwind.errors import LinkwindError, LostError
 from linkwind.protocol import fault_error
 
 TICK = 0.1  # s between two looks of the watchdog
@@ -27,7 +29,7 @@ class Endpoint:
         self._session = open_session(listen, connect, region, security)
         self._connect = connect
         self._doubt = Doubt(self._session, connect, security.identity if security else None)
-        self._trouble: LinkwindError | None = None
+        self._troubles: deque[LinkwindError] = deque()
         self._reading = False
         self._closing = threading.Event()
         self._look = threading.Event()
@@ -66,9 +68,17 @@ class Endpoint:
         raise NotImplementedError
 
     def _fail(self, error: LinkwindError) -> None:
-        if self._trouble is None:
-            self._trouble = error
+        """Let the reader raise an error: of several the first one, but for losses that may be made good."""
+        if not any(_final(trouble) for trouble in tuple(self._troubles)):
+            self._troubles.append(error)
             self._look.set()
+
+    def _raise(self) -> NoReturn:
+        """Raise what was told first; only once what may be made good."""
+        trouble = self._troubles[0]
+        if not _final(trouble):
+            self._troubles.popleft()
+        raise trouble
 
     def _watch(self) -> None:
         """Look around every tick; wake the reader up so that it sees trouble, or a signal."""
@@ -99,8 +109,8 @@ class Endpoint:
                 self._reading = True
                 sample = self._incoming.recv()
                 self._reading = False
-            if self._trouble is not None:
-                raise self._trouble
+            if self._troubles:
+                self._raise()
             if len(sample.payload):
                 return sample
 
@@ -118,3 +128,7 @@ class Endpoint:
         if self._watchdog.is_alive():
             self._watchdog.join()
         self._session.close()  # type: ignore[no-untyped-call]
+
+
+def _final(trouble: LinkwindError) -> bool:
+    return not (isinstance(trouble, LostError) and trouble.provider)

@@ -1,0 +1,100 @@
+"""A provider is killed, stopped or cut off in the middle of a run that waits for it, and comes back."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+from random import Random
+from typing import Any
+
+from linkwind.bus.zenoh import LEASE
+from linkwind.log.reader import open_log
+from linkwind.runs.verify import scenario_of, verify
+from tests.faults.test_processes import Programs
+from tests.networks.namespaces import Machines
+
+PATIENCE = 120.0  # s for a machine under load
+RECOVERY = 30.0  # s
+LONG = (f"bus.recovery={RECOVERY:g}", "coupling.timeout=20", "time.end=10")  # 3 s of wall clock, 10,000 steps
+
+
+def unharmed(process: subprocess.Popen[str], log: Path) -> dict[str, Any]:
+    """Wait for a run; check that every bit of it is as if nothing had been; return its summary."""
+    output, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0, errors
+    assert "Traceback" not in errors, errors
+    summary: dict[str, Any] = json.loads(output)
+    assert open_log(log).complete
+    found = verify(*scenario_of(log))
+    assert found.identical, found
+    assert found.steps == summary["steps"]
+    for back in summary["returns"]:
+        assert f'"{back["provider"]}" was lost at step {back["step"]} ' in errors
+        assert f'"{back["provider"]}" is back after {back["after_s"]:.1f} s' in errors
+    return summary
+
+
+def child_of(run: subprocess.Popen[str]) -> int:
+    """Return the process of a run's only provider."""
+    (child,) = Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text().split()
+    return int(child)
+
+
+def under_way(log: Path) -> None:
+    """Wait until a run has done some steps."""
+    deadline = time.monotonic() + PATIENCE
+    while not log.exists() or log.stat().st_size < 100_000:
+        assert time.monotonic() < deadline, "the run did not get under way"
+        time.sleep(0.005)
+
+
+def hit(
+    folder: Path, number: signal.Signals, after: float, scenario: str = "two_link", *settings: str
+) -> float:
+    """Send a signal to the provider that ``linkwind run`` has started; return how long it was away [s]."""
+    programs = Programs(folder)
+    try:
+        options = [f"--set={setting}" for setting in (*LONG, *settings)]
+        run = programs.start("run", scenario, "--out", "out", "--json", *options)
+        under_way(programs.log())
+        time.sleep(after)
+        os.kill(child_of(run), number)
+        (back,) = unharmed(run, programs.log())["returns"]
+        return float(back["after_s"])
+    finally:
+        programs.end()
+
+
+def cut(folder: Path, gone: float) -> float:
+    """Pull the cable between two machines for a while; return how long the provider was away [s]."""
+    machines = Machines(folder)
+    try:
+        machines.add("d", "a")
+        here, _ = machines.connect("d", "a")
+        machines.start("a", "aero", "--stay", "--connect", f"tcp/{here}:7447")
+        options = ["two_link", "--out", "out", "--json", *(f"--set={setting}" for setting in LONG)]
+        dynamics = machines.start("d", "dynamics", "--listen", "tcp/0.0.0.0:7447", *options)
+        under_way(folder / "out" / "log.mcap")
+        machines.cable("d", 1, "down")
+        time.sleep(gone)
+        machines.cable("d", 1, "up")
+        returns = unharmed(dynamics, folder / "out" / "log.mcap")["returns"]
+        assert len(returns) == 1 if gone > 2.0 * LEASE else len(returns) <= 1
+        return float(sum(back["after_s"] for back in returns))
+    finally:
+        machines.end()
+
+
+def killed(folder: Path, chance: Random) -> float:
+    """Kill the provider at a random moment of two_link."""
+    return hit(folder, signal.SIGKILL, chance.uniform(0.0, 1.5))
+
+
+def cut_off(folder: Path, chance: Random) -> float:
+    """Cut the network for 2 to 10 s; return for how long the run stood still besides."""
+    gone = chance.uniform(2.0, 10.0)
+    return max(0.0, cut(folder, gone) - gone)
