@@ -16,6 +16,7 @@ from linkwind.cli import (
     record,
     replay,
     report,
+    reproduce,
     resume,
     router,
     run,
@@ -49,6 +50,7 @@ resume.register(app)
 fmu.register(app)
 mechanism.register(app)
 validate.register(app)
+reproduce.register(app)
 certs.register(app)
 doctor.register(app)
 router.register(app)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from linkwind.runs.validate.rows import Plot, Row
 
-_STYLE = """body { font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 90rem;
+STYLE = """body { font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 90rem;
 padding: 0 1rem }
 table { border-collapse: collapse } td, th { padding: .25rem .6rem; text-align: left;
 border-bottom: 1px solid #ddd } td.n { text-align: right; font-variant-numeric: tabular-nums;
@@ -59,14 +59,13 @@ def write(path: Path, title: str, rows: Sequence[Row], plots: Sequence[Plot], re
     """Write the page as one HTML file, pictures inside."""
     body = "".join(_table_row(row) for row in rows)
     pictures = "".join(
-        f'<img alt="{html.escape(plot.title)}" src="data:image/png;base64,{_picture(plot)}">'
-        for plot in plots
+        f'<img alt="{html.escape(plot.title)}" src="data:image/png;base64,{picture(plot)}">' for plot in plots
     )
     head = "<tr>" + "".join(f"<th>{name}</th>" for name in HEADINGS) + "</tr>"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(title)}</title>'
-        f"<style>{_STYLE}</style><h1>{html.escape(title)}</h1><p>{summary(rows)}</p>"
+        f"<style>{STYLE}</style><h1>{html.escape(title)}</h1><p>{summary(rows)}</p>"
         f"{pictures}<table>{head}{body}</table><p>{html.escape(remark)}</p>"
         "</html>\n",
         encoding="utf-8",
@@ -82,7 +81,8 @@ def _table_row(row: Row) -> str:
     return f"<tr>{found}</tr>"
 
 
-def _picture(plot: Plot) -> str:
+def picture(plot: Plot) -> str:
+    """Return a plot as PNG, in base64."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
