@@ -28,8 +28,8 @@ def decoded(path: Path) -> dict[str, object]:
 
 
 def test_each_role_has_what_its_machine_needs_and_no_more(certs: Path) -> None:
-    assert sorted(path.name for path in certs.iterdir()) == ["aero", "ca", "dynamics", "observer"]
-    for name in ("aero", "dynamics", "observer"):
+    assert sorted(path.name for path in certs.iterdir()) == ["aero", "ca", "dynamics", "observer", "operator"]
+    for name in ("aero", "dynamics", "observer", "operator"):
         assert sorted(path.name for path in (certs / name).iterdir()) == [
             "ca.pem", "certificate.pem", "key.pem"
         ]  # fmt: skip
@@ -39,7 +39,7 @@ def test_each_role_has_what_its_machine_needs_and_no_more(certs: Path) -> None:
 
 def test_keys_are_for_their_owner_alone(certs: Path) -> None:
     keys = sorted(certs.glob("*/key.pem"))
-    assert len(keys) == 4
+    assert len(keys) == 5
     assert {key.stat().st_mode & 0o777 for key in keys} == {0o600}
 
 

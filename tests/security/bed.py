@@ -83,7 +83,8 @@ class Bed:
 
     def untouched(self) -> bool:
         """Tell whether every bit of the log, up to where the run was stopped, is what nobody disturbed."""
-        assert "StoppedError" in str(open_log(self.log).error)
+        error = str(open_log(self.log).error)
+        assert "StoppedError" in error, error
         return verify(*scenario_of(self.log)).identical
 
     def __exit__(self, *error: object) -> None:

@@ -19,9 +19,9 @@ def certs(
         list[str] | None,
         typer.Option(
             metavar="NAME[=HOST,…]",
-            help="dynamics, observer, router, or a provider's name; with the names and addresses that others "
-            "reach it at, if they connect to it. Repeatable; dynamics=localhost,127.0.0.1,::1, aero and "
-            "observer if not given.",
+            help="dynamics, observer, operator, router, or a provider's name; with the names and addresses "
+            "that others reach it at, if they connect to it. Repeatable; dynamics=localhost,127.0.0.1,::1, "
+            "aero, observer and operator if not given.",
         ),
     ] = None,
     days: Annotated[int, typer.Option(min=1, max=3650, help="That the roles' certificates are valid.")] = 397,

@@ -1,6 +1,7 @@
 """Who is who on a secure bus: certificates for mutual TLS, one for each role.
 
-The name in a certificate is the role: ``dynamics``, ``observer``, ``router``, or the name of a provider.
+The name in a certificate is the role: ``dynamics``, ``observer`` (reads), ``operator``
+(commands events), ``router``, or the name of a provider.
 Certificates are files on the machine of their role. They are in no scenario, so in no log and no message.
 ``authority`` issues them, ``checks`` loads them.
 """
@@ -9,9 +10,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from linkwind.credentials.identity import DYNAMICS, OBSERVER, ROUTER, Identity
+from linkwind.credentials.identity import DYNAMICS, OBSERVER, OPERATOR, ROUTER, Identity
 
-__all__ = ["DYNAMICS", "OBSERVER", "ROUTER", "Identity", "identity_in"]
+__all__ = ["DYNAMICS", "OBSERVER", "OPERATOR", "ROUTER", "Identity", "identity_in"]
 
 
 def identity_in(folder: Path | None, role: str) -> Identity | None:

@@ -16,7 +16,16 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-from linkwind.credentials.identity import AUTHORITY, CA, CERTIFICATE, DYNAMICS, KEY, OBSERVER, ROUTER
+from linkwind.credentials.identity import (
+    AUTHORITY,
+    CA,
+    CERTIFICATE,
+    DYNAMICS,
+    KEY,
+    OBSERVER,
+    OPERATOR,
+    ROUTER,
+)
 from linkwind.errors import CertificateError
 
 AUTHORITY_DAYS = 3650
@@ -36,7 +45,12 @@ class Role:
     hosts: tuple[str, ...] = ()
 
 
-DEFAULT_ROLES = (Role(DYNAMICS, ("localhost", "127.0.0.1", "::1")), Role("aero"), Role(OBSERVER))
+DEFAULT_ROLES = (
+    Role(DYNAMICS, ("localhost", "127.0.0.1", "::1")),
+    Role("aero"),
+    Role(OBSERVER),
+    Role(OPERATOR),
+)
 
 
 def role(text: str) -> Role:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 AUTHORITY = "ca"  # folder of the authority; its key leaves it for no other machine
 CA, CERTIFICATE, KEY = "ca.pem", "certificate.pem", "key.pem"
-DYNAMICS, OBSERVER, ROUTER = "dynamics", "observer", "router"
+DYNAMICS, OBSERVER, OPERATOR, ROUTER = "dynamics", "observer", "operator", "router"
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from linkwind.bus.base import PREFIX
-from linkwind.credentials import DYNAMICS, OBSERVER, ROUTER
+from linkwind.credentials import DYNAMICS, OBSERVER, OPERATOR, ROUTER
 
 RUN = f"{PREFIX}/*"
 EVERYTHING = f"{PREFIX}/**"
@@ -42,6 +42,7 @@ def of_hub(providers: Iterable[str], trusted: str) -> dict[str, Any]:
         _rule("follow", ["declare_subscriber"], ["ingress"], f"{RUN}/motion", f"{RUN}/fault"),
         _rule("read", ["declare_subscriber"], ["ingress"], EVERYTHING),
         _rule("listen", ["query"], ["ingress"], f"{RUN}/scenario", f"{RUN}/playback"),
+        _rule("command", ["query"], ["ingress"], f"{RUN}/control/order"),
         # Whoever has a certificate that means nothing here can learn just that.
         _rule("ask why", ["query"], ["ingress"], f"{RUN}/refusal"),
         _rule("say why", ["reply", "declare_queryable"], ["egress"], f"{RUN}/refusal"),
@@ -49,6 +50,7 @@ def of_hub(providers: Iterable[str], trusted: str) -> dict[str, Any]:
     policies = [
         _policy([trusted], ["hear", "trust"]),
         _policy([OBSERVER], ["hear", "read", "watch", "listen"]),
+        _policy([OPERATOR], ["hear", "command"]),
         _policy(["anybody"], ["ask why", "say why"]),
     ]
     for name in providers:
