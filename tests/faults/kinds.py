@@ -14,12 +14,11 @@ from pathlib import Path
 from random import Random
 
 from linkwind.bus.zenoh import LEASE
-from linkwind.log.reader import open_log
-from linkwind.runs.verify import scenario_of, verify
 from tests.faults.malformed import fuzz
+from tests.faults.programs import Programs
 from tests.faults.test_disk import on_a_full_disk
 from tests.faults.test_malformed import GROWTH
-from tests.faults.test_processes import Programs
+from tests.faults.truth import truthful
 from tests.networks.namespaces import Machines
 from tests.security.attacks import hostile
 from tests.security.bed import Bed, attacker
@@ -49,12 +48,6 @@ def ended(process: subprocess.Popen[str], code: int, *errors: str) -> float:
     assert any(error in said for error in errors), said
     assert "Traceback" not in said, said
     return now
-
-
-def truthful(log: Path) -> None:
-    """Check that a log is not complete, says so, and that every bit that is there is right."""
-    assert not open_log(log).complete
-    assert verify(*scenario_of(log)).identical
 
 
 def hit(side: str, number: signal.Signals, folder: Path, chance: Random) -> Trial:

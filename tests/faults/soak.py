@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from linkwind.log.reader import open_log
-from tests.faults.test_processes import Programs
+from tests.faults.programs import Programs
 
 STEPS = 1_000_000
 WARM = 0.2  # share of the time after which nothing may grow

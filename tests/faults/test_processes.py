@@ -6,74 +6,16 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from linkwind.bus.zenoh import LEASE, ZenohProviderLink, loopback_endpoint
+from linkwind.bus.zenoh import LEASE, ZenohProviderLink
 from linkwind.log.reader import open_log
 from linkwind.schema import MESSAGES
-
-PATIENCE = 30.0  # s for a machine under load; what is asserted about time is much shorter and measured apart
-
-
-class Programs:
-    """Processes of the test, ended by their id whatever happens."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.endpoint = loopback_endpoint()
-        self._started: list[subprocess.Popen[str]] = []
-
-    def start(self, *arguments: str) -> subprocess.Popen[str]:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "linkwind", *arguments],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            cwd=self.folder,
-        )
-        self._started.append(process)
-        return process
-
-    def dynamics(self, *settings: str) -> subprocess.Popen[str]:
-        options = ["--set=time.end=1000", *(f"--set={s}" for s in settings)]
-        return self.start(
-            "dynamics", "two_link", "--listen", self.endpoint, "--out", "out", "--json", *options
-        )
-
-    def aero(self, *options: str) -> subprocess.Popen[str]:
-        return self.start("aero", "--connect", self.endpoint, *options)
-
-    def await_steps(self) -> None:
-        """Return as soon as the log shows that the run goes on."""
-        log = self.log()
-        deadline = time.monotonic() + PATIENCE
-        goal = 200_000 + (log.stat().st_size if log.exists() else 0)
-        while not log.exists() or log.stat().st_size < goal:
-            assert time.monotonic() < deadline, "the run did not get under way"
-            assert all(p.poll() is None for p in self._started), self.outputs()
-            time.sleep(0.01)
-
-    def forget_last(self) -> None:
-        """Let the process that was started last be over without that being a failure."""
-        self._started.pop()
-
-    def outputs(self) -> list[tuple[int | None, str, str]]:
-        return [(p.poll(), *(p.communicate() if p.poll() is not None else ("", ""))) for p in self._started]
-
-    def log(self) -> Path:
-        return self.folder / "out" / "log.mcap"
-
-    def end(self) -> None:
-        for process in self._started:
-            if process.poll() is None:
-                os.kill(process.pid, signal.SIGCONT)
-                process.kill()
-            process.communicate()
+from tests.faults.programs import PATIENCE, Programs
 
 
 @pytest.fixture

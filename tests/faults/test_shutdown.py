@@ -1,63 +1,55 @@
 """Every command that waits for somebody ends at once when it is told to, with nothing left behind.
 
-The ones that step, with their children and logs, are in test_processes.py.
+``python -m tests.faults`` stops all commands, many times.
 """
 
 from __future__ import annotations
 
+import os
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import pytest
 
-from linkwind.bus.zenoh import loopback_endpoint
-from linkwind.runs.run import run
-from linkwind.scenario import load
+from linkwind.interrupt import SOON, TooLateError, at_most, stops_as_interrupt, uninterrupted
+from tests.faults.shutdown import COMMANDS, WAYS, stop
 
-PATIENCE = 30.0  # s for a machine under load
-WITHIN = 2.0  # s; all of them at the same time
-
-WAITING = {  # the command, and what it says when it is ready
-    "dynamics": (["dynamics", "two_link", "--listen", "{}", "--out", "out"], "waiting for aero"),
-    "aero": (["aero", "--connect", "{}"], "waiting for a dynamics"),
-    "aero that stays": (["aero", "--stay", "--connect", "{}"], "waiting for a dynamics"),
-    "router": (["router", "--listen", "{}"], "passing messages on"),
-    "replay": (["replay", "log/log.mcap", "--listen", "{}"], "waiting at"),
-}
+WAITING = ("dynamics, waiting", "aero, waiting", "aero --stay, waiting", "router", "replay, waiting", "view")
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT], ids=["SIGTERM", "Ctrl-C"])
-def test_commands_that_wait_end_within_two_seconds(number: signal.Signals, tmp_path: Path) -> None:
-    run(load("two_link", ["time.end=0.01", "bus.transport=inprocess"]), tmp_path / "log", lambda step: None)
-    processes = {}
-    try:
-        for name, (command, _) in WAITING.items():
-            arguments = [part.format(loopback_endpoint()) for part in command]
-            processes[name] = subprocess.Popen(
-                [sys.executable, "-u", "-m", "linkwind", *arguments],
-                cwd=tmp_path,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                text=True,
-            )
-        for name, process in processes.items():
-            assert process.stdout is not None
-            assert WAITING[name][1] in process.stdout.readline(), name
-        time.sleep(0.5)  # they are in the midst of waiting, not on their way there
-        began = time.monotonic()
-        for process in processes.values():
-            process.send_signal(number)
-        said = {name: process.communicate(timeout=PATIENCE)[0] for name, process in processes.items()}
-        took = time.monotonic() - began
-    finally:
-        for process in processes.values():
-            process.kill()
-            process.communicate()
-    assert {name: process.returncode for name, process in processes.items()} == dict.fromkeys(WAITING, 130)
-    assert not [text for text in said.values() if "Traceback" in text]
-    assert took < WITHIN + 3.0  # the dynamics writes its report in this time
-    assert "stopped at step" in said["dynamics"]
+@pytest.mark.parametrize("name", WAITING)
+def test_a_command_ends_within_two_seconds(name: str, tmp_path: Path) -> None:
+    stop(COMMANDS[name], WAYS[WAITING.index(name) % len(WAYS)], tmp_path)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "SIGTERM"])
+def test_what_a_library_calls_back_is_not_interrupted(number: signal.Signals) -> None:
+    done = []
+
+    @uninterrupted
+    def called_back(item: int) -> int:
+        if not done:
+            os.kill(os.getpid(), number)
+        within(item)
+        return item
+
+    def within(item: int) -> None:
+        done.append(item)
+
+    def calls() -> None:
+        done.extend(sorted([2, 1], key=called_back))
+        time.sleep(1000.0 * SOON)
+        done.append(3)
+
+    with pytest.raises(KeyboardInterrupt), stops_as_interrupt():
+        calls()
+    assert done == [2, 1, 1, 2]
+
+
+def test_a_block_that_is_late_is_ended() -> None:
+    with pytest.raises(TooLateError), at_most(0.05):
+        time.sleep(10.0)
+    with at_most(10.0):
+        pass
+    assert signal.getitimer(signal.ITIMER_REAL)[0] == 0.0

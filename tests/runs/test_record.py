@@ -96,7 +96,7 @@ def no_signals(monkeypatch: pytest.MonkeyPatch) -> None:
         yield
 
     for module in ("listen", "keeping"):
-        monkeypatch.setattr(f"linkwind.runs.{module}.terminate_as_interrupt", nothing)
+        monkeypatch.setattr(f"linkwind.runs.{module}.stops_as_interrupt", nothing)
 
 
 def heard_from_the_start(folder: Path, *settings: str, name: str = "two_link") -> tuple[Log, Recording]:

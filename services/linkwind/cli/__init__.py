@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
+import os
 import sys
+from typing import Any
 
 import typer
 
@@ -26,8 +29,10 @@ from linkwind.cli import (
     verify,
     view,
 )
-from linkwind.errors import LinkwindError
-from linkwind.interrupt import terminate_as_interrupt
+from linkwind.errors import LinkwindError, StoppedError
+from linkwind.interrupt import stops_as_interrupt
+
+STOPPED = StoppedError.exit_code
 
 app = typer.Typer(
     name="linkwind",
@@ -71,12 +76,30 @@ def version(
 
 def main() -> None:
     """Run the command line; an error is one message and an exit code that tells its kind."""
+    status: Any = 0
     try:
-        with terminate_as_interrupt():
+        with stops_as_interrupt():
             app()
     except LinkwindError as error:
         print(f"error: {error}", file=sys.stderr)
-        sys.exit(error.exit_code)
+        status = error.exit_code
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
-        sys.exit(130)
+        status = STOPPED
+    except SystemExit as end:
+        status = end.code
+    if status == STOPPED:
+        _leave(status)
+    sys.exit(status)
+
+
+def _leave(status: int) -> None:
+    """End the process now.
+
+    Python would wait for zenoh's threads, and these for a session to be closed that was being opened, or
+    closed, when the process was told to stop.
+    """
+    atexit._run_exitfuncs()  # children and temporary files
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from linkwind.errors import LogError
+from linkwind.interrupt import uninterrupted
 
 
 class Sink:
@@ -33,6 +34,7 @@ class Sink:
         self._position = 0
         self.failure: OSError | None = None
 
+    @uninterrupted
     def write(self, data: Any, /) -> int:
         """Write all of ``data``; on failure, keep the reason."""
         rest = memoryview(data)
@@ -44,10 +46,12 @@ class Sink:
             self.failure = error
         return len(data)
 
+    @uninterrupted
     def seek(self, offset: int, whence: int = os.SEEK_SET, /) -> int:
         """Return the position; the MCAP writer never moves it."""
         return self._position
 
+    @uninterrupted
     def flush(self) -> None:
         """Nothing to do: every write went to the operating system."""
 

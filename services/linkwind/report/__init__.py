@@ -32,9 +32,11 @@ def write_report(log_path: Path, out: Path) -> None:
     try:
         partial.write_text(page, encoding="utf-8")
         partial.replace(out)  # a page that is there stays whole until the new one is
-    except OSError as error:
+    except BaseException as error:
         with contextlib.suppress(OSError):
             partial.unlink(missing_ok=True)
+        if not isinstance(error, OSError):
+            raise
         raise InputError(f"{out}: cannot write the report: {error.strerror}. Choose another place") from error
 
 

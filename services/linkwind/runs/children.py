@@ -5,13 +5,14 @@ from __future__ import annotations
 import contextlib
 import subprocess
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from linkwind.errors import LostError
 from linkwind.protocol import DynamicsSession
 
-PATIENCE = 5.0  # s for a process to end by itself
+PATIENCE = 5.0  # s for all processes to end by themselves
 STARTS = 3  # without an answer in between
 
 
@@ -89,10 +90,11 @@ class Children:
             )
 
     def end(self, patience: float) -> None:
-        """Wait for every process, then end those that are left."""
+        """Wait ``patience`` [s] for all processes, then end those that are left."""
+        end = time.monotonic() + patience
         for child in self._children.values():
             with contextlib.suppress(subprocess.TimeoutExpired):
-                child.process.wait(patience)
+                child.process.wait(max(0.0, end - time.monotonic()))
         for child in self._children.values():
             child.end()
 

@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 from linkwind.bus.base import DynamicsLink
-from linkwind.errors import LinkwindError
-from linkwind.interrupt import terminate_as_interrupt
+from linkwind.errors import LinkwindError, StoppedError
+from linkwind.interrupt import TooLateError, at_most, stops_as_interrupt
 from linkwind.log.writer import LogWriter
 
 T = TypeVar("T")
 
 LOG, REPORT = "log.mcap", "report.html"
+REPORT_TIME = 1.0  # s for the report of a run that was told to stop
 
 
 @dataclass(frozen=True)
@@ -53,12 +54,13 @@ def keep(
     """
     log, report = folder / LOG, folder / REPORT
     try:
-        with terminate_as_interrupt(), closing(link), new_log(log) as writer:
+        with stops_as_interrupt(), closing(link), new_log(log) as writer:
             result = job(writer)
     except LinkwindError as error:
         if not log.exists():
             raise
-        raise type(error)(f"{error}\nlog: {log}\nreport: {_report(log, report) or report}") from error
+        make = _report_at_once if isinstance(error, StoppedError) else _report
+        raise type(error)(f"{error}\nlog: {log}\nreport: {make(log, report) or report}") from error
     return Kept(result, log, report, _report(log, report), writer.cut)
 
 
@@ -71,3 +73,12 @@ def _report(log: Path, report: Path) -> str:
     except LinkwindError as error:
         return str(error)
     return ""
+
+
+def _report_at_once(log: Path, report: Path) -> str:
+    """Write the report if that can be done at once: who stops a run does not wait for it."""
+    try:
+        with at_most(REPORT_TIME):
+            return _report(log, report)
+    except TooLateError:
+        return f"takes more than {REPORT_TIME:g} s. Make it with: linkwind report {log}"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from linkwind.credentials import Identity
 from linkwind.errors import RefusedError, StoppedError
-from linkwind.interrupt import terminate_as_interrupt
+from linkwind.interrupt import stops_as_interrupt
 from linkwind.listening import Described, described, ended
 from linkwind.log.contents import END, RUN, STATE
 from linkwind.log.heard import HeardLog
@@ -78,7 +78,7 @@ def listen_to(
     """
     from linkwind.bus.zenoh import ZenohListener
 
-    with terminate_as_interrupt(), closing(ZenohListener(listen, connect, run, identity)) as listener:
+    with stops_as_interrupt(), closing(ZenohListener(listen, connect, run, identity)) as listener:
         about = described(listener.find(timeout))
         _check_version(about)
         scenario = from_json(about.scenario_json)

@@ -16,7 +16,7 @@ from linkwind import schema
 from linkwind.bus.base import DynamicsLink
 from linkwind.dynamics.recorder import Recorder, tables_sha256
 from linkwind.dynamics.service import DynamicsService
-from linkwind.errors import InputError, LinkwindError, LogError
+from linkwind.errors import InputError, LinkwindError, LogError, StoppedError
 from linkwind.log.contents import DYNAMICS, STATE, SUBSTITUTED
 from linkwind.log.difference import Difference
 from linkwind.log.reader import Log, open_log
@@ -76,6 +76,7 @@ def verify(
     Raises:
         LogError: there is nothing to compare.
         InputError: the log's scenario cannot be run here, or a file is missing or another one.
+        StoppedError: Ctrl-C or SIGTERM.
     """
     recorded = from_recorded_wrenches or log.metadata.get(SUBSTITUTED) == DYNAMICS
     mechanism = build(scenario)
@@ -91,6 +92,8 @@ def verify(
             difference = found.difference
         except LogEndsError as end:
             remark = "; ".join(filter(None, (remark, str(end))))
+        except StoppedError:
+            raise
         except LinkwindError as error:
             difference = comparison.left_over(f"none: the run ended with {error}")
             remark = f"{remark}; run again, it ends with {error}".removeprefix("; ")

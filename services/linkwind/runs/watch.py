@@ -21,7 +21,7 @@ from linkwind.runs.playback import TICK, Playback, Steering
 
 WATCHED_INTERVAL = 0.1  # s after which messages are in the file while somebody looks
 NOTICEABLE = 0.05  # s; who waits longer brings everything into the file first
-PATIENCE = 5.0  # s for the server to end
+PATIENCE = 1.0  # s for the server to end by itself
 
 
 class Watch:
