@@ -9,6 +9,7 @@ SLOW = (
     "tests/dynamics/test_recovery.py::test_a_death_at_any_moment_changes_no_bit[right-explicit",
     "tests/dynamics/test_recovery.py::test_a_death_at_any_moment_changes_no_bit[right-implicit",
     "tests/faults/test_disk.py::test_slow_disk",
+    "tests/runs/test_conformance.py::test_what_is_wrong_is_found",
     "tests/runs/test_reproduce.py::test_the_paper",
     "tests/faults/test_killed_and_resumed.py",
     "tests/faults/test_restarted.py",

@@ -11,6 +11,7 @@ import typer
 
 from linkwind.cli import (
     certs,
+    conformance,
     doctor,
     fmu,
     happen,
@@ -57,6 +58,7 @@ mechanism.register(app)
 validate.register(app)
 reproduce.register(app)
 certs.register(app)
+conformance.register(app)
 doctor.register(app)
 router.register(app)
 happen.register(app)

@@ -1,0 +1,170 @@
+"""A provider that uses nothing of linkwind: drag on every body, F = -c |v| v.
+
+    pip install eclipse-zenoh protobuf
+    python provider.py tcp/127.0.0.1:7447          # to: linkwind dynamics two_link
+
+It follows schemas/README.md from top to bottom. It remembers nothing, so it can go back, go on from a
+checkpoint and come back after it was killed with almost no work. linkwind conformance finds nothing wrong.
+"""
+
+import hashlib
+import json
+import queue
+import sys
+import time
+import uuid
+from math import hypot
+from pathlib import Path
+
+import zenoh
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+
+DRAG = 0.5  # N·s²/m²
+POINT = 1  # kind of the wrench: the value at t_{k+1}
+
+endpoint, name = sys.argv[1], (sys.argv[2:] or ["aero"])[0]
+
+# ---- the schema ----
+
+descriptors = (Path(__file__).parent.parent / "linkwind/v1/linkwind.binpb").read_bytes()
+pool = descriptor_pool.DescriptorPool()
+for file in descriptor_pb2.FileDescriptorSet.FromString(descriptors).file:
+    pool.Add(file)
+Control, MotionStep, WrenchStep, Checkpoint = (
+    message_factory.GetMessageClass(pool.FindMessageTypeByName(f"linkwind.v1.{message}"))
+    for message in ("Control", "MotionStep", "WrenchStep", "Checkpoint")
+)
+
+# ---- the bus ----
+
+config = zenoh.Config()
+settings = {
+    "mode": "peer",
+    "region_name": "provider",
+    "connect/endpoints": [endpoint],
+    "scouting/multicast/enabled": False,
+    "transport/link/tx/lease": 1000,
+}
+for key, value in settings.items():
+    config.insert_json5(key, json.dumps(value))
+session = zenoh.open(config)
+
+
+def request(run, **body):
+    """Ask the dynamics until it answers."""
+    asked = Control(**body).SerializeToString()
+    while True:
+        for reply in session.get(f"linkwind/v1/{run}/control/{name}", payload=asked, timeout=5.0):
+            if reply.ok is not None:
+                answer = Control.FromString(reply.ok.payload.to_bytes())
+                if answer.HasField("refuse"):
+                    sys.exit(answer.refuse.reason)
+                return answer
+        time.sleep(0.05)
+
+
+# ---- hand-shake ----
+
+instance = uuid.uuid4().hex
+hello = {"name": name, "schema_sha256": hashlib.sha256(descriptors).hexdigest(), "instance": instance}
+welcome = request("*", hello=hello).welcome
+bodies = [list(welcome.bodies).index(body) for body in welcome.provider_bodies]
+base = f"linkwind/v1/{welcome.run}"
+inbox = queue.SimpleQueue()
+motions = session.declare_subscriber(f"{base}/motion", lambda sample: inbox.put(sample.payload.to_bytes()))
+fault = session.declare_subscriber(f"{base}/fault", lambda _: inbox.put(None))
+left = session.liveliness().declare_subscriber(
+    f"{base}/alive/dynamics",
+    lambda sample: inbox.put(None) if sample.kind == zenoh.SampleKind.DELETE else None,
+)
+block = {"congestion_control": zenoh.CongestionControl.BLOCK}
+wrenches = session.declare_publisher(f"{base}/wrench/{name}", **block)
+checkpoints = session.declare_publisher(f"{base}/observe/checkpoint/{name}", **block)
+token = session.liveliness().declare_token(f"{base}/alive/{name}")
+
+resumed = welcome.HasField("resume")
+start = welcome.resume.step if resumed else -1  # committed before the first motion
+saved = welcome.resume.number - 1 if resumed else 0
+at, answer = (start, 0), b""
+
+
+def wrench(motion):
+    """Return the answer to a motion."""
+    found = WrenchStep(
+        run=welcome.run,
+        provider=name,
+        step=motion.step,
+        iteration=motion.iteration,
+        time_ns=motion.time_ns,
+        kind=POINT,
+    )
+    for body in bodies:
+        v = motion.trial.linear[3 * body : 3 * body + 3]
+        found.force.extend(-DRAG * hypot(*v) * component for component in v)
+        found.torque.extend([0.0, 0.0, 0.0])
+    return found.SerializeToString(deterministic=True)
+
+
+def commit(step):
+    """Take an accepted state: nothing to remember, but a checkpoint may be due."""
+    global saved
+    if welcome.checkpoint_every and step and step % welcome.checkpoint_every == 0:
+        saved += 1
+        if saved > welcome.catch_up.checkpoints_taken:
+            nothing = hashlib.sha256(b"").digest()
+            time_ns = step * welcome.step_ns
+            message = Checkpoint(
+                run=welcome.run,
+                provider=name,
+                number=saved,
+                step=step,
+                time_ns=time_ns,
+                state=b"",
+                sha256=nothing,
+            )
+            checkpoints.put(message.SerializeToString())
+
+
+def respond(payload):
+    """Return the answer to a motion message; None if there is none to give."""
+    global at, answer
+    motion = MotionStep.FromString(payload)
+    if motion.final:
+        commit(motion.step)
+        return None
+    asked = (motion.step, motion.iteration)
+    if asked < at:
+        return b""
+    if asked == at and answer:
+        return answer
+    if asked == (at[0] + 1, 0):
+        if motion.step:
+            commit(motion.step - 1)
+    elif asked != (at[0], at[1] + 1):
+        text = f"expected step {at[0] + 1}; got {motion.step}: a motion was lost"
+        request(
+            welcome.run,
+            fault={"participant": name, "step": motion.step, "code": "ProtocolError", "text": text},
+        )
+        sys.exit(text)
+    at, answer = asked, wrench(motion)
+    return answer
+
+
+# ---- lock step ----
+
+again = [hashlib.sha256(respond(motion)).digest() for motion in welcome.catch_up.motions]
+ready = {"name": name, "instance": instance, "kind": POINT, "rollback": True}
+if welcome.HasField("catch_up"):
+    ready["answers_sha256"] = hashlib.sha256(b"".join(again)).digest()
+request(welcome.run, ready=ready)
+while (payload := inbox.get()) is not None:
+    if not payload:
+        continue
+    reply = respond(payload)
+    if reply is None:
+        request(welcome.run, bye={"name": name, "checkpoints": saved})
+        break
+    if reply:
+        wrenches.put(reply)
+session.close()
