@@ -6,7 +6,7 @@ import math
 import pytest
 from scipy.special import ellipj, ellipk
 
-from linkwind.runs.validate import MULTIBODY, page
+from linkwind.runs.validate import COUPLING, MULTIBODY, page
 from linkwind.runs.validate.multibody import elliptic
 from linkwind.runs.validate.rows import Findings, Row, most, near
 
@@ -60,6 +60,14 @@ CHEAP = (
 @pytest.mark.parametrize("name", CHEAP)
 def test_multibody(name):
     (found,) = MULTIBODY.run(True, (name,))
+    assert found.rows
+    for row in found.rows:
+        assert row.ok, row
+
+
+@pytest.mark.parametrize("name", COUPLING.cases)
+def test_coupling(name):
+    (found,) = COUPLING.run(True, (name,))
     assert found.rows
     for row in found.rows:
         assert row.ok, row

@@ -24,6 +24,7 @@ def register(app: typer.Typer) -> None:
     group = typer.Typer(no_args_is_help=True, help="Compare a model with published and exact values.")
     group.command()(flow)
     group.command()(multibody)
+    group.command()(coupling)
     app.add_typer(group, name="validate")
 
 
@@ -63,6 +64,23 @@ def multibody(
     from linkwind.runs.validate import MULTIBODY
 
     _validate("multibody", MULTIBODY, short, tuple(case or ()), out, as_json)
+
+
+def coupling(
+    short: Annotated[bool, typer.Option("--short", help="Fewer and coarser, a second.")] = False,
+    case: CaseOption = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Folder for coupling.html: the table and plots.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Compare the coupling schemes with closed forms; exit code 5 if one is off.
+
+    Example: linkwind validate coupling --out validation
+    """
+    from linkwind.runs.validate import COUPLING
+
+    _validate("coupling", COUPLING, short, tuple(case or ()), out, as_json)
 
 
 def _validate(

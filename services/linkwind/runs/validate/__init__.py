@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
-from linkwind.runs.validate import balance, cylinder, free, multibody, plate
+from linkwind.runs.validate import balance, coupling, cylinder, free, multibody, plate
 from linkwind.runs.validate.rows import Curve, Findings, Plot, Row
 
-__all__ = ["FLOW", "MULTIBODY", "Curve", "Findings", "Plot", "Row", "Suite"]
+__all__ = ["COUPLING", "FLOW", "MULTIBODY", "Curve", "Findings", "Plot", "Row", "Suite"]
 
 
 @dataclass(frozen=True)
@@ -52,6 +52,13 @@ FLOW = Suite(
     "In two dimensions a bluff plate at Re of 1000 and more has more drag than a real one, whose vortices "
     "break up along the span. After separation the motion of falling bodies is chaotic: means and early "
     "windows are compared, never late trajectories.",
+)
+
+COUPLING = Suite(
+    "coupling schemes against closed forms",
+    coupling.CASES,
+    remark="A single body, whose fluid is a formula. Bounds are for a degree that does not adapt; an "
+    "adaptive one is stable up to the bound of degree 0.",
 )
 
 MULTIBODY = Suite(
