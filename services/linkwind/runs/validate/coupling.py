@@ -122,10 +122,10 @@ def _answer(says: Says) -> Answer:
     return Answer(wrench, added, slope)
 
 
-def orders(short: bool) -> Findings:
+def orders(_short: bool) -> Findings:
     """A damped oscillator that is pushed, all of its forces coupled, against its closed form."""
     c, k, push, rate, end = 0.6, 9.0, 2.0, 2.3, 2.0
-    finest = 200 if short else 800
+    finest = 800
 
     def fluid(seen: Seen) -> Says:
         x, v = seen.now
