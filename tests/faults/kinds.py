@@ -6,6 +6,7 @@ import os
 import re
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Callable
 from contextlib import closing
@@ -13,11 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 
-from linkwind.bus.zenoh import LEASE
-from tests.faults.malformed import fuzz
+from linkwind.bus.base import PREFIX
+from linkwind.bus.zenoh import LARGEST, LEASE
 from tests.faults.programs import Programs
-from tests.faults.test_disk import on_a_full_disk
-from tests.faults.test_malformed import GROWTH
+from tests.faults.shutdown import COMMANDS, WAYS, stop
+from tests.faults.test_disk import on_a_disk_that_fails, on_a_full_disk
 from tests.faults.truth import truthful
 from tests.networks.namespaces import Machines
 from tests.security.attacks import hostile
@@ -73,24 +74,6 @@ def hit(side: str, number: signal.Signals, folder: Path, chance: Random) -> Tria
         programs.end()
 
 
-def told(number: signal.Signals, folder: Path, chance: Random) -> Trial:
-    """Tell a run to stop."""
-    programs = Programs(folder)
-    try:
-        run = programs.start("run", "two_link", "--out", "out", "--set=time.end=1000")
-        programs.await_steps()
-        time.sleep(chance.uniform(0.0, 1.0))
-        children = Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text().split()
-        run.send_signal(number)
-        began = time.monotonic()
-        within = ended(run, 130, "stopped at step ") - began
-        assert not [child for child in children if Path(f"/proc/{child}").exists()]
-        truthful(programs.log())
-        return Trial(within, 0.0)
-    finally:
-        programs.end()
-
-
 def cut(folder: Path, chance: Random) -> Trial:
     """Pull the cable between two machines for 0.1 to 10 s."""
     machines, log = Machines(folder), folder / "out" / "log.mcap"
@@ -127,6 +110,11 @@ def cut(folder: Path, chance: Random) -> Trial:
         return Trial(max(0.0, within - gone), 0.0)
     finally:
         machines.end()
+
+
+def resident(pid: int) -> int:
+    """Return the memory that a process holds [bytes]."""
+    return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
 def grows(log: Path) -> None:
@@ -180,12 +168,38 @@ def struck(folder: Path, chance: Random) -> Trial:
     return Trial(within, 0.0)
 
 
+def oversized(folder: Path, chance: Random) -> Trial:
+    """Publish wrenches far larger than any that the run could need; they are dropped, and cost no memory."""
+    programs = Programs(folder)
+    try:
+        dynamics = programs.dynamics("coupling.timeout=60", run="attacked")
+        programs.aero()
+        programs.await_steps()
+        before = resident(dynamics.pid)
+        with closing(attacker(programs.endpoint, None)) as session:
+            while not any(True for _ in session.info.peers_zid()):
+                time.sleep(0.01)
+            began = time.monotonic()
+            for size in (2 * LARGEST, chance.randrange(100_000, 50_000_000)):
+                session.put(f"{PREFIX}/attacked/wrench/aero", bytes(size))
+            within = time.monotonic() - began
+            programs.await_steps()
+        grown = resident(dynamics.pid) - before
+        assert grown < 1.2 * LARGEST, f"{grown / 1e6:.0f} MB more"
+        dynamics.send_signal(signal.SIGINT)
+        ended(dynamics, 130, "stopped at step ")
+        truthful(programs.log())
+        return Trial(within, 0.0)
+    finally:
+        programs.end()
+
+
 def malformed(folder: Path, chance: Random) -> Trial:
     """Give both ends 5,000 malformed messages; none may be an unnamed error, leave a trace, or memory."""
+    program = [sys.executable, "-m", "tests.faults.malformed", str(MESSAGES), str(chance.randrange(2**31))]
     began = time.monotonic()
-    done = fuzz(MESSAGES, chance.randrange(2**31))
-    assert not done.unexpected, done.unexpected
-    assert done.grown < GROWTH, done.grown
+    done = subprocess.run(program, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
     return Trial((time.monotonic() - began) / MESSAGES)
 
 
@@ -199,17 +213,28 @@ def full(folder: Path, chance: Random) -> Trial:
     return Trial(time.monotonic() - began)
 
 
+def read_only(folder: Path, chance: Random) -> Trial:
+    """Let the disk become one that can only be read in the middle of a run, which may need its log or not."""
+    required, after = chance.random() < 0.5, chance.uniform(0.0, 0.3)
+    return Trial(on_a_disk_that_fails(folder, required=required, after=after))
+
+
 Kind = Callable[[Path, Random], Trial]
 KINDS: dict[str, Kind] = {
     f"{side} {name}": lambda folder, chance, side=side, number=number: hit(side, number, folder, chance)
     for side in ("aero", "dynamics")
     for name, number in (("killed", signal.SIGKILL), ("stopped", signal.SIGSTOP))
 } | {
-    "Ctrl-C": lambda folder, chance: told(signal.SIGINT, folder, chance),
-    "SIGTERM": lambda folder, chance: told(signal.SIGTERM, folder, chance),
     "network cut, 0.1 to 10 s": cut,
     "late, then twice": twice,
     "hostile message, no TLS": struck,
+    "oversized message, no TLS": oversized,
     "5,000 malformed messages": malformed,
     "disk full": full,
+    "disk becomes read-only": read_only,
 }  # fmt: skip
+
+STOPS: dict[str, Kind] = {
+    f"stop {name}": lambda folder, chance, command=command: Trial(stop(command, chance.choice(WAYS), folder))
+    for name, command in COMMANDS.items()
+}

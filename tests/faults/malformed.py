@@ -1,8 +1,13 @@
-"""Messages that a participant should never get: mutations of good ones, by chance and with intent."""
+"""Messages that a participant should never get: mutations of good ones, by chance and with intent.
+
+``python -m tests.faults.malformed COUNT SEED`` feeds both ends with them; it fails if any is not refused by
+name, or leaves anything behind.
+"""
 
 from __future__ import annotations
 
 import gc
+import sys
 import tracemalloc
 from collections import Counter
 from collections.abc import Callable
@@ -22,6 +27,7 @@ from tests.fakes import FakeModel
 
 RUN = "fuzzed"
 LARGE = 200_000  # bytes
+GROWTH = 4_000_000  # bytes; Python's table of names may double once, messages come to 100 MB
 
 
 def good() -> dict[str, bytes]:
@@ -208,3 +214,9 @@ def _held() -> int:
     """Return the memory that is in use, without what is only waiting to be collected [bytes]."""
     gc.collect()
     return tracemalloc.get_traced_memory()[0]
+
+
+if __name__ == "__main__":
+    done = fuzz(int(sys.argv[1]), int(sys.argv[2]))
+    print(done)
+    sys.exit(bool(done.unexpected) or done.grown > GROWTH or done.answers["taken"] == 0)

@@ -46,8 +46,8 @@ class Programs:
         self._started.append(process)
         return process
 
-    def dynamics(self, *settings: str) -> subprocess.Popen[str]:
-        options = ["--set=time.end=1000", *(f"--set={s}" for s in settings)]
+    def dynamics(self, *settings: str, run: str = "out") -> subprocess.Popen[str]:
+        options = ["--run", run, "--set=time.end=1000", *(f"--set={s}" for s in settings)]
         return self.start(
             "dynamics", "two_link", "--listen", self.endpoint, "--out", "out", "--json", *options
         )

@@ -16,6 +16,9 @@ from linkwind.log.reader import open_log
 from linkwind.runs.run import run
 from linkwind.runs.verify import scenario_of, verify
 from linkwind.scenario import load
+from tests.faults import disks
+from tests.faults.disks import Disk
+from tests.faults.programs import PATIENCE, Programs
 
 ROOM = 1_500_000  # bytes; two_link has 2,300 a step
 SETTINGS = ("--set=time.end=1.2", "--set=bus.transport=inprocess")
@@ -90,3 +93,39 @@ def test_disk_that_cannot_be_written_is_named_before_anything_starts(tmp_path: P
     done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 3
     assert "file/out: cannot create the folder of the run: Not a directory" in done.stderr
+
+
+def on_a_disk_that_fails(folder: Path, *, required: bool, after: float) -> float:
+    """Run two_link on a disk that can only be read after ``after`` s; return how long it still took [s]."""
+    disk = Disk(folder)
+    programs = Programs(disk.place)
+    log = programs.log()
+    try:
+        settings = ["--set=time.end=15", f"--set=log.required={str(required).lower()}"]
+        process = programs.start("run", "two_link", "--out", "out", "--json", *settings)
+        programs.await_steps()
+        time.sleep(after)
+        disk.fail()
+        began = time.monotonic()
+        output, said = process.communicate(timeout=PATIENCE)
+        took = time.monotonic() - began
+        assert "expected to write the log; got Read-only file system. The file is cut there" in said, said
+        assert "Traceback" not in said, said
+        assert process.returncode == (3 if required else 0), said
+        if not required:
+            assert "Read-only file system" in json.loads(output)["log_trouble"]
+            assert json.loads(output)["steps"] == 15_000
+        assert not open_log(log).complete
+        assert open_log(log).steps > 0
+        assert verify(*scenario_of(log)).identical
+        return took
+    finally:
+        programs.end()
+        disk.end()
+
+
+@pytest.mark.parametrize("required", [True, False])
+def test_disk_that_can_only_be_read_all_at_once(required: bool, tmp_path: Path) -> None:
+    if why := disks.reason():
+        pytest.skip(why)
+    on_a_disk_that_fails(tmp_path, required=required, after=0.1)

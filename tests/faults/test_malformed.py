@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import os
 
-from tests.faults.malformed import fuzz
+from tests.faults.malformed import GROWTH, fuzz
 
 MESSAGES = int(os.environ.get("LINKWIND_MESSAGES", "3000"))
 SEED = 20210305  # the first day of the paper
-GROWTH = 4_000_000  # bytes; Python's table of names may double once, messages come to 100 MB
 
 
 def test_malformed_messages_end_in_named_errors_and_leave_no_trace() -> None:

@@ -11,9 +11,10 @@ from linkwind.bus.zenoh.order import order
 from linkwind.bus.zenoh.player import ZenohPlayer
 from linkwind.bus.zenoh.provider import ZenohProviderLink
 from linkwind.bus.zenoh.router import ZenohRouter
-from linkwind.bus.zenoh.session import LEASE, OBSERVER, loopback_endpoint, open_session
+from linkwind.bus.zenoh.session import LARGEST, LEASE, OBSERVER, loopback_endpoint, open_session
 
 __all__ = [
+    "LARGEST",
     "LEASE",
     "OBSERVER",
     "SPIN",

@@ -69,7 +69,9 @@ class ZenohDynamicsLink(Endpoint):
         """
         base = f"{PREFIX}/{key_segment(session.run, '--run')}"
         security = Security(identity, of_hub(session.providers, ROUTER)) if identity else None
-        super().__init__(listen, connect, DYNAMICS, security)
+        bodies = max(map(len, session.providers.values()), default=0)
+        limits = {f"{base}/wrench/*": _largest_wrench(bodies)}
+        super().__init__(listen, connect, DYNAMICS, security, limits)
         self._exchanging = session
         self._timeout = timeout
         self._posted_at = float("inf")
@@ -179,6 +181,11 @@ class ZenohDynamicsLink(Endpoint):
     def checkpoints(self) -> list[tuple[str, bytes]]:
         """Take the checkpoints that have come; see :meth:`frames`."""
         return _taken(self._kept)
+
+
+def _largest_wrench(bodies: int) -> int:
+    """Return what the wrench on so many bodies may need, every matrix included [bytes]."""
+    return 2**16 + 8 * (6 * bodies + 36 * bodies + 36 * bodies**2)
 
 
 def _taken(subscriber: Any) -> list[tuple[str, bytes]]:

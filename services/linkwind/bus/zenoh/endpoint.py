@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NoReturn
 
 import zenoh
@@ -13,7 +13,7 @@ from zenoh.handlers import FifoChannel
 
 from linkwind.bus.base import PREFIX
 from linkwind.bus.zenoh.diagnosis import Doubt
-from linkwind.bus.zenoh.session import Security, open_session
+from linkwind.bus.zenoh.session import LARGEST_FAULT, Security, open_session
 from linkwind.errors import LinkwindError, LostError
 from linkwind.protocol import fault_error
 
@@ -24,9 +24,15 @@ class Endpoint:
     """What both ends share: a queue of incoming messages whose reader can be woken up by trouble."""
 
     def __init__(
-        self, listen: Sequence[str], connect: Sequence[str], region: str, security: Security | None
+        self,
+        listen: Sequence[str],
+        connect: Sequence[str],
+        region: str,
+        security: Security | None,
+        limits: Mapping[str, int],
     ) -> None:
-        self._session = open_session(listen, connect, region, security)
+        limits = {f"{PREFIX}/*/fault": LARGEST_FAULT, **limits}
+        self._session = open_session(listen, connect, region, security, limits)
         self._connect = connect
         self._doubt = Doubt(self._session, connect, security.identity if security else None)
         self._troubles: deque[LinkwindError] = deque()

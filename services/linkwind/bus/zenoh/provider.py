@@ -11,9 +11,17 @@ import zenoh
 from linkwind.bus.base import PREFIX
 from linkwind.bus.zenoh.access import of_guest
 from linkwind.bus.zenoh.endpoint import Endpoint
-from linkwind.bus.zenoh.session import LEASE, PROVIDER, Security, key_segment
+from linkwind.bus.zenoh.session import (
+    LARGEST,
+    LARGEST_MOTION,
+    LARGEST_REQUEST,
+    LEASE,
+    PROVIDER,
+    Security,
+    key_segment,
+)
 from linkwind.credentials import Identity
-from linkwind.errors import LostError, ParticipantError
+from linkwind.errors import LostError, ParticipantError, SimulationError
 
 ANSWER = 5.0  # s for the answer to a request: a Welcome may carry the memory of a large model
 
@@ -41,7 +49,8 @@ class ZenohProviderLink(Endpoint):
         """
         self._run = run if run == "*" else key_segment(run, "--run")
         self._name = key_segment(name, "--name")
-        super().__init__(listen, connect, PROVIDER, Security(identity, of_guest()) if identity else None)
+        security = Security(identity, of_guest()) if identity else None
+        super().__init__(listen, connect, PROVIDER, security, {f"{PREFIX}/*/motion": LARGEST_MOTION})
         self._dynamics_seen = False
         self._joined_at = float("inf")
 
@@ -112,7 +121,16 @@ class ZenohProviderLink(Endpoint):
         self._frames.put(frame)
 
     def keep(self, checkpoint: bytes) -> None:
-        """Send a checkpoint to the dynamics."""
+        """Send a checkpoint to the dynamics.
+
+        Raises:
+            SimulationError: it is too large for the bus.
+        """
+        if len(checkpoint) > LARGEST - LARGEST_REQUEST:
+            raise SimulationError(
+                f"checkpoint: expected at most {LARGEST / 1e6:.0f} MB; got {len(checkpoint) / 1e6:.0f} MB. "
+                "Use a smaller model, or log.checkpoint_every = 0 and bus.recovery = 0."
+            )
         self._checkpoints.put(checkpoint)
 
     def reply(self, wrench: bytes) -> None:

@@ -6,8 +6,9 @@ import json
 import os
 import re
 import socket
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import zenoh
@@ -19,7 +20,11 @@ from linkwind.errors import InputError
 DYNAMICS, PROVIDER, OBSERVER = REGIONS = ("dynamics", "provider", "observer")
 LEASE = 1.0  # s without a sign of life after which a participant counts as lost
 
-LARGEST_REQUEST = 65_536  # bytes of a control request; the answer may be as large as a model's memory
+# bytes of a message, which wait in memory until it is whole; what is larger is dropped
+LARGEST = 2**28  # of any: the memory of a flow of 7 million cells
+LARGEST_REQUEST = 2**16  # of a control request; the answer may be as large as a model's memory
+LARGEST_FAULT = 2**16
+LARGEST_MOTION = 2**24  # 30,000 bodies; a provider does not know how many there are before it has joined
 
 # One runtime for accepting and receiving: less time a round trip than with zenoh's separate threads. Sending
 # has its own: what is passed on waits, in the thread that received it, until there is room to send it.
@@ -58,7 +63,11 @@ class Security:
 
 
 def open_session(
-    listen: Sequence[str], connect: Sequence[str], region: str, security: Security | None = None
+    listen: Sequence[str],
+    connect: Sequence[str],
+    region: str,
+    security: Security | None = None,
+    limits: Mapping[str, int] = MappingProxyType({}),
 ) -> zenoh.Session:
     """Open zenoh with linkwind's settings, on and to these endpoints.
 
@@ -67,11 +76,12 @@ def open_session(
         connect: likewise.
         region: what kind of participant this is, for a router.
         security: certificates and rules; None for a network that can be trusted.
+        limits: bytes that a message may have under a key expression; larger ones never get here.
 
     Raises:
         InputError: an endpoint cannot be opened, or is of the wrong kind.
     """
-    return _open(listen, connect, security, {"mode": "peer", "region_name": region})
+    return _open(listen, connect, security, {"mode": "peer", "region_name": region}, limits)
 
 
 def open_router(
@@ -79,11 +89,15 @@ def open_router(
 ) -> zenoh.Session:
     """Open what only passes messages on, between participants that need not reach each other."""
     regions = [{"filters": [{"region_names": [region]}]} for region in REGIONS]
-    return _open(listen, connect, security, {"mode": "router", "gateway": {"south": regions}})
+    return _open(listen, connect, security, {"mode": "router", "gateway": {"south": regions}}, {})
 
 
 def _open(
-    listen: Sequence[str], connect: Sequence[str], security: Security | None, place: dict[str, Any]
+    listen: Sequence[str],
+    connect: Sequence[str],
+    security: Security | None,
+    place: dict[str, Any],
+    limits: Mapping[str, int],
 ) -> zenoh.Session:
     _check_kind([*listen, *connect], security)
     settings = {
@@ -99,14 +113,10 @@ def _open(
         "transport/link/tx/lease": int(LEASE * 1000),
         "transport/link/tx/keep_alive": 4,
         "transport/link/tx/queue/size/data_low": 16,  # of 64 kB, for listeners that are behind for a moment
+        "transport/link/rx/max_message_size": LARGEST,
         "low_pass_filter": [
-            {
-                "id": "requests",
-                "messages": ["query"],
-                "flows": ["ingress"],
-                "key_exprs": ["**"],
-                "size_limit": LARGEST_REQUEST,
-            }
+            _limit("query", "**", LARGEST_REQUEST),
+            *(_limit("put", key, limit) for key, limit in limits.items()),
         ],
         **(security.settings() if security else {}),
     }
@@ -122,6 +132,17 @@ def _open(
             f"zenoh: cannot {where}: {reason}. Expected a free endpoint such as tcp/127.0.0.1:7448; is "
             "another dynamics running there, is the address this machine's?"
         ) from error
+
+
+def _limit(message: str, key: str, size: int) -> dict[str, Any]:
+    """Return the rule that keeps out what is larger."""
+    return {
+        "id": f"{message} {key}",
+        "messages": [message],
+        "flows": ["ingress"],
+        "key_exprs": [key],
+        "size_limit": size,
+    }
 
 
 def _check_kind(endpoints: Sequence[str], security: Security | None) -> None:
