@@ -14,7 +14,8 @@ from linkwind.log.reader import open_log
 from tests.faults.programs import Programs
 
 STEPS = 1_000_000
-WARM = 0.2  # share of the time after which nothing may grow
+WARM = 0.2  # share of the steps, or of the time, after which nothing may grow
+STEP_BYTES = 2170  # of the log
 POOL = 2  # threads that zenoh may have more or less of at a time
 INDEX = 10  # bytes that the log's index holds in memory for each step of the dynamics
 
@@ -44,18 +45,19 @@ def main(seconds: float) -> int:
             programs.await_steps()
             began, before, after = time.monotonic(), {}, {}
             while dynamics.poll() is None and (passed := time.monotonic() - began) < seconds:
-                if passed > WARM * seconds and not before:
+                size = programs.log().stat().st_size
+                if not before and max(passed / seconds, size / (STEPS * STEP_BYTES)) > WARM:
                     before = {name: use(process.pid) for name, process in sides.items()}
-                    size = programs.log().stat().st_size
+                    first = size
                 if before and sides["aero"].poll() is None:
                     after = {name: use(process.pid) for name, process in sides.items()}
                 time.sleep(0.2)
-            grown = programs.log().stat().st_size - size
             dynamics.send_signal(signal.SIGINT)
             dynamics.communicate()
             log = open_log(programs.log())
-            steps = log.steps * grown / programs.log().stat().st_size
-            print(f"{log.steps} steps; what was held after {WARM:.0%} of the time, and at the end")
+            warm = round(log.steps * first / programs.log().stat().st_size)
+            steps = log.steps - warm
+            print(f"{log.steps:,} steps; what was held after {warm:,}, and at the end")
             flat = True
             for name, start in before.items():
                 end = after[name]
