@@ -113,8 +113,8 @@ NEW = Beginning({})
 
 def run(
     scenario: Scenario,
-    out: Path | None,
-    progress: Progress,
+    out: Path | None = None,
+    progress: Progress = lambda step: None,
     files: Mapping[str, Path] = MappingProxyType({}),
     tls: Path | None = None,
     watch: Watch | None = None,
