@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -33,6 +34,13 @@ def test_names_are_those_that_are_said() -> None:
         _ = linkwind.fly
     with pytest.raises(linkwind.LinkwindError, match="two_lnk"):
         linkwind.load("two_lnk")
+
+
+def test_runs_in_threads_beside_each_other(tmp_path: Path) -> None:
+    scenario = linkwind.load("two_link", ["bus.transport=inprocess", "time.end=0.05"])
+    with ThreadPoolExecutor(2) as pool:
+        outcomes = list(pool.map(lambda name: linkwind.run(scenario, tmp_path / name), "abcd"))
+    assert len({outcome.result.final_state_sha256 for outcome in outcomes}) == 1
 
 
 def test_importing_loads_nothing_heavy() -> None:

@@ -60,8 +60,12 @@ def at_most(seconds: float) -> Iterator[None]:
 def stops_as_interrupt() -> Iterator[None]:
     """Let Ctrl-C and SIGTERM end the block, so that the log is closed and nobody is left waiting.
 
-    A signal that is ignored, as the shell has it for programs in the background, stays so.
+    A signal that is ignored, as the shell has it for programs in the background, stays so; in a thread beside
+    the main one, where none arrives, nothing is to be done.
     """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         if _must_wait(frame):
