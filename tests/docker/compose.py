@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -16,6 +17,8 @@ IMAGE = "linkwind-under-test"
 PATIENCE = 120.0  # s for a machine under load
 # Not by chance: these build an image, which takes minutes, and need Docker. tests/docker/run.sh has it all.
 REASON = "" if "LINKWIND_TEST_DOCKER" in os.environ else "builds an image: run tests/docker/run.sh"
+COMPOSE = os.environ.get("COMPOSE", "docker-compose")
+PROFILES = ("force-fmu", "observe", "replay", "view")
 NOBODY = 4321  # a user that neither this machine nor the image knows
 
 
@@ -42,12 +45,13 @@ class Project:
         self._settings = {f"LINKWIND_{name.upper()}": str(path) for name, path in self.folders.items()}
         self._settings["LINKWIND_IMAGE"] = image
         self._started: list[subprocess.Popen[str]] = []
+        self._seen = 0
 
     def start(self, *arguments: str, **settings: str) -> subprocess.Popen[str]:
-        """Start ``docker-compose ARGUMENTS`` with LINKWIND_… settings."""
+        """Start ``docker compose ARGUMENTS`` with LINKWIND_… settings."""
         given = {f"LINKWIND_{name}": value for name, value in settings.items()}
         process = subprocess.Popen(
-            ["docker-compose", *self._files, "-p", self.name, "--ansi", "never", *arguments],
+            [COMPOSE, *self._files, "-p", self.name, "--ansi", "never", *arguments],
             cwd=ROOT,
             env=os.environ | self._settings | given,
             stdout=subprocess.PIPE,
@@ -58,7 +62,7 @@ class Project:
         return process
 
     def do(self, *arguments: str, **settings: str) -> tuple[int, str]:
-        """Return exit status and output of ``docker-compose ARGUMENTS``."""
+        """Return exit status and output of ``docker compose ARGUMENTS``."""
         process = self.start(*arguments, **settings)
         output, _ = process.communicate(timeout=PATIENCE)
         return process.returncode, output
@@ -68,8 +72,32 @@ class Project:
         return self.do("up", "--exit-code-from", "dynamics", *services, **settings)
 
     def container(self, service: str) -> str:
-        """Return the name of the container of a service."""
-        return f"{self.name}_{service}_1"
+        """Return the id of the container of a service."""
+        labels = {"project": self.name, "service": service}
+        filters = [f"--filter=label=com.docker.compose.{key}={value}" for key, value in labels.items()]
+        return docker("ps", "-a", "-q", *filters)
+
+    def kill(self, service: str, *, by_docker: bool = False) -> None:
+        """Kill the first process of a container, from outside or by Docker, for which that is a wish."""
+        container = self.container(service)
+        if by_docker:
+            docker("kill", container)
+        else:
+            pid = int(docker("inspect", "--format", "{{.State.Pid}}", container))
+            assert pid > 0, f"{service} does not run"
+            os.kill(pid, signal.SIGKILL)
+        self._seen = max(log.stat().st_size for log in self._logs())
+
+    def await_end(self) -> int:
+        """Return the status of the dynamics as soon as it is not started again."""
+        deadline = time.monotonic() + PATIENCE
+        while True:
+            said = docker("inspect", "--format", "{{json .State}}", self.container("dynamics"))
+            state = json.loads(said)
+            if state["Status"] == "exited":
+                return int(state["ExitCode"])
+            assert time.monotonic() < deadline, self.do("logs")[1]
+            time.sleep(0.1)
 
     def folder(self) -> Path:
         """Return the results of the only run."""
@@ -77,12 +105,17 @@ class Project:
         return folder
 
     def await_steps(self) -> None:
-        """Return as soon as the growing log shows that the run goes on."""
+        """Return as soon as the growing log shows that the run goes on, again if it did before."""
         deadline = time.monotonic() + PATIENCE
-        while not any(log.stat().st_size > 1_000_000 for log in self.folders["runs"].glob("*/log.mcap")):
-            assert time.monotonic() < deadline, "the run did not get under way"
-            assert self._started[-1].poll() is None, self._started[-1].communicate()[0]
+        goal = self._seen + 1_000_000
+        while max((log.stat().st_size for log in self._logs()), default=0) < goal:
+            assert time.monotonic() < deadline, f"the run did not get under way: {self.do('logs')[1]}"
+            ended = self._started[-1].poll()
+            assert ended in (None, 0), self._started[-1].communicate()[0]
             time.sleep(0.02)
+
+    def _logs(self) -> list[Path]:
+        return list(self.folders["runs"].glob("*/log.mcap"))
 
     def leftovers(self) -> list[str]:
         """Return the containers, networks and volumes of the project that are still there."""
@@ -96,7 +129,8 @@ class Project:
             if process.poll() is None:
                 process.kill()
             process.communicate()
-        self.do("--profile", "force-fmu", "down", "--remove-orphans", "--volumes", "--timeout", "5")
+        profiles = [part for name in PROFILES for part in ("--profile", name)]
+        self.do(*profiles, "down", "--remove-orphans", "--volumes", "--timeout", "5")
 
 
 def linkwind(*arguments: str) -> str:

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.docker.compose import IMAGE, ROOT, Project
+from tests.docker.compose import COMPOSE, IMAGE, ROOT, Project
 
 
 @pytest.fixture(scope="session")
 def image() -> str:
     """Build the image by the compose file, on $BASE where it is given."""
-    compose = ["docker-compose", "-f", str(ROOT / "docker" / "compose.yaml"), "build", "--quiet"]
+    compose = [COMPOSE, "-f", str(ROOT / "docker" / "compose.yaml"), "build", "--quiet"]
     done = subprocess.run(
         compose, env=os.environ | {"LINKWIND_IMAGE": IMAGE}, capture_output=True, text=True, check=False
     )

@@ -112,8 +112,9 @@ def test_bad_input_is_the_status_of_the_run(project: Project, settings: dict[str
     assert error in output
 
 
-def test_killed_aero_fails_the_run_and_leaves_log_and_report(project: Project) -> None:
-    up = project.start("up", "--exit-code-from", "dynamics", END="1000")
+def test_killed_aero_fails_a_run_that_does_not_wait_for_it(project: Project) -> None:
+    settings = {"END": "1000", "RECOVERY": "0"}
+    up = project.start("up", "--exit-code-from", "dynamics", **settings)
     project.await_steps()
     docker("kill", project.container("aero"))
     assert up.wait(PATIENCE) == 4

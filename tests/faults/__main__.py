@@ -15,13 +15,17 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from random import Random
 
-from tests.faults import disks
+from tests.faults import containers, disks
 from tests.faults.kinds import KINDS, STOPS, Kind, Trial
 from tests.networks import namespaces
 
 SEED = 20210305  # the first day of the paper
 AT_ONCE = 3  # most of them wait, most of the time
-REASONS: dict[str, Callable[[], str]] = {"network": namespaces.reason, "read-only": disks.reason}
+REASONS: dict[str, Callable[[], str]] = {
+    "network": namespaces.reason,
+    "read-only": disks.reason,
+    "container": containers.reason,
+}
 
 
 def tried(name: str, kind: Kind, seed: int) -> Trial | str:

@@ -31,10 +31,12 @@ from linkwind.runs.diff import diff
 from linkwind.runs.listen import Recording, listen_to
 from linkwind.runs.playback import Steering
 from linkwind.runs.replay import Selection, replay
-from linkwind.runs.run import Ends, dynamics
+from linkwind.runs.restart import restart
+from linkwind.runs.run import Ends, dynamics, run
 from linkwind.runs.verify import scenario_of, verify
 from linkwind.scenario import load
 from tests.runs.edit import rewrite
+from tests.runs.test_resume import cut
 
 PATIENCE = 60.0
 
@@ -448,3 +450,25 @@ def test_nobody_there(tmp_path: Path) -> None:
         listen_to(listen=[], connect=[loopback_endpoint()], run="*", out=tmp_path, timeout=0.3)
     with pytest.raises(InputError, match="--run: expected letters"):
         listen_to(listen=[], connect=[loopback_endpoint()], run="a/b", out=tmp_path, timeout=0.3)
+
+
+@pytest.mark.parametrize("name", ["two_link", "two_link_flow"])
+def test_a_run_that_goes_on_is_heard_from_its_beginning(name: str, tmp_path: Path) -> None:
+    settings = ["log.checkpoint_every=10", "bus.transport=inprocess"]
+    settings += ["time.end=0.06"] if name == "two_link" else [
+        "time.end=4e-3", "aero.flow.cells=16", "aero.flow.frames=8",
+    ]  # fmt: skip
+    whole = run(load(name, settings), tmp_path / "whole" / "out", lambda step: None)
+    (tmp_path / "out").mkdir()
+    cut(whole.log, tmp_path / "out" / "log.mcap", sum(open_log(whole.log).topics.values()) // 2)
+    endpoint = loopback_endpoint()
+    recorder, provider = listening(endpoint, tmp_path / "heard"), Job(lambda: provide(endpoint))
+    scenario = load(name, [setting for setting in settings if "inprocess" not in setting])
+    restart(scenario, tmp_path / "out", lambda step: None, Ends([endpoint], []), listened=True)
+    provider.done()
+    assert not recorder.done().missed
+    own, heard = open_log(tmp_path / "out" / "log.mcap"), open_log(tmp_path / "heard" / "log.mcap")
+    assert own.final_state_sha256 == whole.result.final_state_sha256
+    assert heard.complete
+    assert list(heard.raw()) == list(own.raw())
+    assert heard.metadata == own.metadata

@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import os
 import sys
+from typing import Any
 
 import typer
 
@@ -31,6 +32,8 @@ from linkwind.cli import (
 )
 from linkwind.errors import LinkwindError, StoppedError
 from linkwind.interrupt import stops_as_interrupt
+
+STOPPED = StoppedError.exit_code
 
 app = typer.Typer(
     name="linkwind",
@@ -75,7 +78,7 @@ def version(
 
 def main() -> None:
     """Run the command line; an error is one message and an exit code that tells its kind."""
-    status = 0
+    status: Any = 0
     try:
         with stops_as_interrupt():
             app()
@@ -84,17 +87,19 @@ def main() -> None:
         status = error.exit_code
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
-        status = StoppedError.exit_code
+        status = STOPPED
     except SystemExit as end:
-        status = end.code if isinstance(end.code, int) else int(end.code is not None)
-    _leave(status)
+        status = end.code
+    if status == STOPPED:
+        _leave(status)
+    sys.exit(status)
 
 
 def _leave(status: int) -> None:
     """End the process now.
 
-    Python would wait for zenoh's threads, and these for a session to be closed: one that was being opened, or
-    closed, when the process was told to stop, or whose peers do not answer.
+    Python would wait for zenoh's threads, and these for a session to be closed that was being opened, or
+    closed, when the process was told to stop.
     """
     atexit._run_exitfuncs()  # children and temporary files
     sys.stdout.flush()

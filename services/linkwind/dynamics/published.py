@@ -44,36 +44,37 @@ class PublishedLog:
 
     def motion(self, payload: bytes, time_ns: int) -> None:
         self._log.motion(payload, time_ns)
-        self._publish(MOTION, payload, time_ns)
+        self.publish(MOTION, payload, time_ns)
 
     def wrench(self, provider: str, payload: bytes, time_ns: int) -> None:
         self._log.wrench(provider, payload, time_ns)
-        self._publish(WRENCH + provider, payload, time_ns)
+        self.publish(WRENCH + provider, payload, time_ns)
 
     def state(self, payload: bytes, time_ns: int) -> None:
         self._log.state(payload, time_ns)
-        self._publish(STATE, payload, time_ns)
+        self.publish(STATE, payload, time_ns)
 
     def step(self, payload: bytes, time_ns: int) -> None:
         self._log.step(payload, time_ns)
-        self._publish(STEP, payload, time_ns)
+        self.publish(STEP, payload, time_ns)
 
     def timing(self, payload: bytes, time_ns: int) -> None:
         self._log.timing(payload, time_ns)
-        self._publish(TIMING, payload, time_ns)
+        self.publish(TIMING, payload, time_ns)
 
     def checkpoint(self, provider: str, payload: bytes, time_ns: int) -> None:
         self._log.checkpoint(provider, payload, time_ns)
-        self._publish(CHECKPOINT + provider, payload, time_ns)
+        self.publish(CHECKPOINT + provider, payload, time_ns)
 
     def frame(self, provider: str, frame: FlowFrame) -> None:
         self._log.frame(provider, frame)
         topic = FLOW + provider
         wanted = self._stream.wants(topic)
         payload = frame.encode(self._run, provider, self._numbers[topic] + 1) if wanted else b""
-        self._publish(topic, payload, frame.time_ns)
+        self.publish(topic, payload, frame.time_ns)
 
-    def _publish(self, topic: str, payload: bytes, time_ns: int) -> None:
+    def publish(self, topic: str, payload: bytes, time_ns: int) -> None:
+        """Publish a message, as it is on the bus, that was written."""
         self._numbers[topic] += 1
         if self._stream.wants(topic):
             self._stream.put(topic, self._numbers[topic], time_ns, payload)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import NamedTuple
 
 from linkwind import checkpoints
@@ -12,11 +13,15 @@ from linkwind.log.reader import Log
 
 
 class Shown(NamedTuple):
-    """A message that is no part of the lock step: topic, simulation time [ns], payload as logged."""
+    """A message that is no part of the lock step: topic, simulation time [ns], payload as logged.
+
+    ``sent`` makes it as it was on the bus.
+    """
 
     topic: str
     time_ns: int
     payload: bytes
+    sent: Callable[[], bytes]
 
 
 class Exchange(NamedTuple):
@@ -67,7 +72,8 @@ def exchanges(log: Log, step_ns: int) -> Iterator[Exchange]:
         elif topic.startswith(WRENCH):
             current.wrenches[topic.removeprefix(WRENCH)] = payload
         else:
-            current.shown.append(Shown(topic, time_ns, payload))
+            sent = partial(log.as_sent, channel, number, payload)
+            current.shown.append(Shown(topic, time_ns, payload, sent))
 
 
 class Record:

@@ -80,7 +80,7 @@ def restart(
         ends: where dynamics and providers meet.
         run_id: id of the run; empty for the folder's name.
         watch: who looks at the run while it goes on, if anybody.
-        listened: a run that begins does so when somebody listens to all of its log.
+        listened: do not begin, or go on, before somebody listens to all of the log.
         goes_on: is told of a run that goes on.
 
     Raises:
@@ -104,7 +104,7 @@ def restart(
             return _finished(log)
         found = _plan(log, scenario)
         goes_on(found)
-        return resume_here(found, progress, ends, watch)
+        return resume_here(found, progress, ends, watch, listened=listened)
 
 
 def _unfinished(scenario: Scenario) -> Path | None:

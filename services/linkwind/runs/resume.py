@@ -17,9 +17,10 @@ from typing import Any
 
 from linkwind import aero
 from linkwind.bus.base import DynamicsLink
+from linkwind.dynamics.published import PublishedLog
 from linkwind.dynamics.service import DynamicsService
 from linkwind.errors import InputError, LogError
-from linkwind.log.contents import CHANGES, RESUMED_STEP, SUBSTITUTED
+from linkwind.log.contents import CHANGES, RESUMED_STEP, RETURNS, SUBSTITUTED
 from linkwind.log.reader import Log
 from linkwind.log.writer import LogWriter
 from linkwind.mechanism import build
@@ -174,7 +175,9 @@ def resume_elsewhere(
     return Resumed(with_elsewhere(service, folder, progress, ends, beginning, watch), found)
 
 
-def resume_here(found: Plan, progress: Progress, ends: Ends, watch: Watch | None = None) -> Resumed:
+def resume_here(
+    found: Plan, progress: Progress, ends: Ends, watch: Watch | None = None, *, listened: bool = False
+) -> Resumed:
     """Go on with a run in its own folder, with providers that are started elsewhere; see :func:`resume`.
 
     The new log takes the place of the old one as soon as it holds as much (:mod:`linkwind.runs.successor`).
@@ -182,9 +185,9 @@ def resume_here(found: Plan, progress: Progress, ends: Ends, watch: Watch | None
     successor = Successor(found.log, lambda: watch is None or watch.opened)
     service, beginning = _continued(found, successor)
     try:
-        return Resumed(
-            with_elsewhere(service, found.log.path.parent, progress, ends, beginning, watch), found
-        )
+        folder = found.log.path.parent
+        done = with_elsewhere(service, folder, progress, ends, beginning, watch, listened=listened)
+        return Resumed(done, found)
     finally:
         successor.end()
 
@@ -206,9 +209,11 @@ def _continued(found: Plan, successor: Successor | None = None) -> tuple[Dynamic
     def link(live: DynamicsLink) -> DynamicsLink:
         return SplicedLink(session, live, record, found.start, finder(scenario, mechanism))
 
-    def new_log(writer: LogWriter) -> ContinuedLog:
-        comparison = Comparison(log, scenario, mechanism, wrenches=False)
-        return ContinuedLog(writer, record, comparison, found.last, step_ns, successor)
+    def new_log(writer: LogWriter, log: LogWriter | PublishedLog) -> ContinuedLog:
+        for back in found.log.record(RETURNS).values():
+            writer.returned(**json.loads(back))
+        comparison = Comparison(found.log, scenario, mechanism, wrenches=False)
+        return ContinuedLog(writer, log, record, comparison, found.last, step_ns, successor)
 
     return service, Beginning(_metadata(found), link, new_log, successor)
 

@@ -73,6 +73,7 @@ class Outcome:
 
 
 Progress = Callable[[int], None]
+Heard = LogWriter | PublishedLog
 
 
 @dataclass(frozen=True)
@@ -97,14 +98,14 @@ class Beginning:
     Attributes:
         metadata: for the new log.
         link: puts something in front of the bus.
-        log: puts something in front of the new log.
+        log: puts something in front of the new log; is given what writes it, and what publishes it as well.
         successor: what the new log is until it takes the place of the one in the same folder; None if there
             is none.
     """
 
     metadata: Mapping[str, str]
     link: Callable[[DynamicsLink], DynamicsLink] = lambda link: link
-    log: Callable[[LogWriter], MessageLog] = lambda writer: writer
+    log: Callable[[LogWriter, Heard], MessageLog] = lambda writer, heard: heard
     successor: Successor | None = None
 
 
@@ -240,7 +241,8 @@ def drive(
         if watch is not None:
             watch.begin(writer)
             service.hold = _holding(watch, service, writer, poll)
-        with _heard(beginning.log(writer), writer, link, service, listened=listened) as log:
+        with _heard(writer, link, service, listened=listened) as heard:
+            log = beginning.log(writer, heard)
             recorder = Recorder(log, service.scenario, service.mechanism, service.multibody)
             result = service.run(beginning.link(link), recorder, progress, poll)
             if successor is not None:
@@ -259,20 +261,18 @@ def drive(
 
 
 def _heard(
-    log: MessageLog, writer: LogWriter, link: DynamicsLink, service: DynamicsService, *, listened: bool
-) -> AbstractContextManager[MessageLog]:
-    """Return a log that others on the bus can listen to, if it is one from the beginning.
+    writer: LogWriter, link: DynamicsLink, service: DynamicsService, *, listened: bool
+) -> AbstractContextManager[Heard]:
+    """Return a log that others on the bus can listen to, where there are others.
 
     Raises:
         LostError: somebody must listen, and nobody does within bus.start_timeout.
     """
     session, timeout = service.session, service.scenario.bus.start_timeout
-    if log is not writer:
-        return nullcontext(log)
     about = description(session.run, service.scenario.to_json(), writer.records)
     stream = link.listeners(topics(list(session.providers)), about)
     if stream is None:
-        return nullcontext(log)
+        return nullcontext(writer)
     if listened and not link.wait(lambda: stream.followed, timeout, lambda: None):
         raise LostError(
             f"nobody listened within {timeout:g} s (bus.start_timeout). Start: linkwind record --connect "

@@ -13,6 +13,7 @@ from contextlib import suppress
 from google.protobuf.message import DecodeError
 
 from linkwind.bus.base import DynamicsLink
+from linkwind.dynamics.published import PublishedLog
 from linkwind.errors import MismatchError
 from linkwind.frames import FlowFrame
 from linkwind.log.contents import WRENCH
@@ -104,15 +105,19 @@ class ContinuedLog:
 
     def __init__(
         self,
-        log: LogWriter,
+        writer: LogWriter,
+        log: LogWriter | PublishedLog,
         record: Record,
         comparison: Comparison,
         last: int,
         step_ns: int,
         successor: Successor | None = None,
     ) -> None:
-        """Write to ``log``; up to the step ``last``, compare and take from the record what the run lacks."""
-        self._log, self._record, self._comparison = log, record, comparison
+        """Write to ``log``, and so to ``writer``; up to the step ``last``, compare with the record.
+
+        What the run lacks up to there is taken from the record.
+        """
+        self._writer, self._log, self._record, self._comparison = writer, log, record, comparison
         self._last_ns = last * step_ns
         self._successor = successor
         self.scene, self.diagnostics, self.wrench = log.scene, log.diagnostics, log.wrench
@@ -123,7 +128,7 @@ class ContinuedLog:
             self._compare(self._comparison.motion, payload, time_ns)
         self._log.motion(payload, time_ns)
         if self._successor is not None:
-            self._successor.reached(self._log, time_ns)
+            self._successor.reached(self._writer, time_ns)
 
     def state(self, payload: bytes, time_ns: int) -> None:
         """Write an accepted state."""
@@ -143,8 +148,10 @@ class ContinuedLog:
         if exchange is None:
             self._log.timing(payload, time_ns)
             return
-        for topic, shown_ns, recorded in exchange.shown:
-            self._log.copy(topic, recorded, shown_ns)
+        for topic, shown_ns, recorded, sent in exchange.shown:
+            self._writer.copy(topic, recorded, shown_ns)
+            if isinstance(self._log, PublishedLog):
+                self._log.publish(topic, sent(), shown_ns)
 
     def frame(self, provider: str, frame: FlowFrame) -> None:
         """Write a frame, unless it is in the record."""
