@@ -8,6 +8,7 @@ import sys
 from typing import Any
 
 import typer
+from typer.models import CommandInfo, TyperInfo
 
 from linkwind.cli import (
     certs,
@@ -43,25 +44,20 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-run.register(app)
-services.register(app)
-scenario.register(app)
-report.register(app)
-logs.register(app)
-verify.register(app)
-view.register(app)
-replay.register(app)
-record.register(app)
-resume.register(app)
-fmu.register(app)
-mechanism.register(app)
-validate.register(app)
-reproduce.register(app)
-certs.register(app)
-conformance.register(app)
-doctor.register(app)
-router.register(app)
-happen.register(app)
+PANELS = {
+    "Run": (run, services, resume, scenario),
+    "Look at a run": (report, view, logs),
+    "Check": (verify, validate, reproduce, conformance, doctor),
+    "On the bus": (replay, record, happen, router, certs),
+    "Other formats": (fmu, mechanism),
+}
+for panel, modules in PANELS.items():
+    for module in modules:
+        module.register(app)
+    commands: list[CommandInfo | TyperInfo] = [*app.registered_commands, *app.registered_groups]
+    for command in commands:
+        if not isinstance(command.rich_help_panel, str):
+            command.rich_help_panel = panel
 
 
 @app.callback(invoke_without_command=True)
