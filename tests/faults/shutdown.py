@@ -13,8 +13,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from linkwind.log.reader import open_log
-from linkwind.runs.run import run as run_here
-from linkwind.scenario import load
 from tests.faults.programs import PATIENCE, Programs
 from tests.faults.truth import truthful
 from tests.fmi_host.foreign import fmu
@@ -22,6 +20,7 @@ from tests.fmi_host.test_matrix import DRAG, WHEN
 
 Process = subprocess.Popen[str]
 LONG = "--set=time.end=1000"
+PATIENT = "--set=coupling.timeout=60"
 HANGING = """
 [time]
 end = 1.0
@@ -80,13 +79,14 @@ class Stage(Programs):
 
     def some_log(self, *settings: str) -> str:
         """Make a log; return its name."""
-        settings = ("bus.transport=inprocess", *(settings or ("time.end=0.05",)))
-        run_here(load("two_link", settings), self.folder / "some", lambda step: None)
+        options = [f"--set={each}" for each in ("bus.transport=inprocess", *(settings or ("time.end=0.05",)))]
+        self.start("run", "two_link", "--out", "some", "--json", *options).communicate()
+        self.forget_last()
         return "some/log.mcap"
 
 
 def run(stage: Stage) -> Process:
-    return stage.steps(stage.command("run", "two_link", "--out", "out", LONG))
+    return stage.steps(stage.command("run", "two_link", "--out", "out", LONG, PATIENT))
 
 
 def run_in_view(stage: Stage) -> Process:
@@ -107,8 +107,8 @@ def dynamics_waiting(stage: Stage) -> Process:
 
 
 def _dynamics(stage: Stage, scenario: str = "two_link", *options: str) -> Process:
-    command = ["dynamics", scenario, "--listen", stage.endpoint, "--out", "out", LONG, "--json", *options]
-    return stage.command(*command)
+    command = ["dynamics", scenario, "--listen", stage.endpoint, "--out", "out", "--json", LONG, PATIENT]
+    return stage.command(*command, *options)
 
 
 def _aero(stage: Stage, *options: str) -> Process:
@@ -162,7 +162,7 @@ def force_fmu(stage: Stage) -> Process:
     made = ["fmu", "export", "two_link", "--part", "aero", "-o", "plate.fmu"]
     stage.start(*made).communicate()
     stage.forget_last()
-    options = ["--force-fmu", "plate.fmu", "--out", "out", LONG]
+    options = ["--force-fmu", "plate.fmu", "--out", "out", LONG, PATIENT]
     return stage.steps(stage.command("run", "two_link", *options))
 
 
@@ -217,7 +217,9 @@ def verify(stage: Stage) -> Process:
 
 def resume(stage: Stage) -> Process:
     stage.some_log("time.end=0.5", "log.required=true")
-    return stage.steps(stage.command("resume", "some/log.mcap", "--from-step", "300", "--out", "out", LONG))
+    return stage.steps(
+        stage.command("resume", "some/log.mcap", "--from-step", "300", "--out", "out", LONG, PATIENT)
+    )
 
 
 def router(stage: Stage) -> Process:
@@ -283,7 +285,8 @@ def stop(command: Command, way: str, folder: Path) -> float:
             process.send_signal(signal.SIGINT if way == "Ctrl-C" else signal.SIGTERM)
         process.wait(PATIENCE)
         took = time.monotonic() - began
-        left = stage.left_by(process)
+        while (left := stage.left_by(process)) and time.monotonic() < began + WITHIN:
+            time.sleep(0.01)  # what is killed takes a moment
         said = stage.said(process)
         assert process.returncode == 130, f"status {process.returncode}: {said}"
         assert "Traceback" not in said, said

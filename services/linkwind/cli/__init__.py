@@ -5,7 +5,6 @@ from __future__ import annotations
 import atexit
 import os
 import sys
-from typing import Any
 
 import typer
 from typer.models import CommandInfo, TyperInfo
@@ -33,8 +32,6 @@ from linkwind.cli import (
 )
 from linkwind.errors import LinkwindError, StoppedError
 from linkwind.interrupt import stops_as_interrupt
-
-STOPPED = StoppedError.exit_code
 
 app = typer.Typer(
     name="linkwind",
@@ -74,7 +71,7 @@ def version(
 
 def main() -> None:
     """Run the command line; an error is one message and an exit code that tells its kind."""
-    status: Any = 0
+    status = 0
     try:
         with stops_as_interrupt():
             app()
@@ -83,19 +80,17 @@ def main() -> None:
         status = error.exit_code
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
-        status = STOPPED
+        status = StoppedError.exit_code
     except SystemExit as end:
-        status = end.code
-    if status == STOPPED:
-        _leave(status)
-    sys.exit(status)
+        status = end.code if isinstance(end.code, int) else int(end.code is not None)
+    _leave(status)
 
 
 def _leave(status: int) -> None:
     """End the process now.
 
-    Python would wait for zenoh's threads, and these for a session to be closed that was being opened, or
-    closed, when the process was told to stop.
+    Python would wait for zenoh's threads, and these for a session to be closed: one that was being opened, or
+    closed, when the process was told to stop, or whose peers do not answer.
     """
     atexit._run_exitfuncs()  # children and temporary files
     sys.stdout.flush()

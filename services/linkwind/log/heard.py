@@ -15,6 +15,7 @@ from foxglove.messages import FrameTransforms, Grid, SceneUpdate
 
 from linkwind import frames, schema
 from linkwind.errors import MissedError
+from linkwind.interrupt import uninterrupted
 from linkwind.listening import Described, Ended
 from linkwind.log import contents, grid
 from linkwind.log.chunks import SchemaInfo
@@ -46,6 +47,7 @@ class HeardLog:
         self._missed: Counter[str] = Counter()
         self._holes: dict[str, list[str]] = {}
 
+    @uninterrupted
     def message(self, topic: str, number: int, time_ns: int, payload: bytes) -> None:
         """Take a message.
 
@@ -86,6 +88,7 @@ class HeardLog:
             self._channels[topic] = self._copy.channel(topic, _schema(topic))
         return self._channels[topic]
 
+    @uninterrupted
     def finish(self, ended: Ended | None, reason: str) -> str:
         """Write how the run ended, and what was missed; make the file whole.
 

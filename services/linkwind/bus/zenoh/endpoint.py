@@ -13,7 +13,7 @@ from zenoh.handlers import FifoChannel
 
 from linkwind.bus.base import PREFIX
 from linkwind.bus.zenoh.diagnosis import Doubt
-from linkwind.bus.zenoh.session import LARGEST_FAULT, Security, open_session
+from linkwind.bus.zenoh.session import LARGEST_FAULT, Security, close_session, open_session
 from linkwind.errors import LinkwindError, LostError
 from linkwind.protocol import fault_error
 
@@ -133,7 +133,7 @@ class Endpoint:
         self._look.set()
         if self._watchdog.is_alive():
             self._watchdog.join()
-        self._session.close()  # type: ignore[no-untyped-call]
+        close_session(self._session)
 
 
 def _final(trouble: LinkwindError) -> bool:

@@ -12,7 +12,7 @@ from zenoh.handlers import FifoChannel
 from linkwind.bus.base import PREFIX
 from linkwind.bus.zenoh.access import of_guest
 from linkwind.bus.zenoh.diagnosis import Doubt
-from linkwind.bus.zenoh.session import OBSERVER, Security, key_segment, open_session
+from linkwind.bus.zenoh.session import OBSERVER, Security, close_session, key_segment, open_session
 from linkwind.bus.zenoh.stream import END
 from linkwind.credentials import Identity
 from linkwind.errors import LostError, ParticipantError
@@ -124,4 +124,4 @@ class ZenohListener:
 
     def close(self) -> None:
         """Leave the bus."""
-        self._session.close()  # type: ignore[no-untyped-call]
+        close_session(self._session)

@@ -10,7 +10,7 @@ import zenoh
 from linkwind.bus.base import PREFIX
 from linkwind.bus.zenoh.access import of_hub
 from linkwind.bus.zenoh.diagnosis import Doubt
-from linkwind.bus.zenoh.session import DYNAMICS, Security, open_session
+from linkwind.bus.zenoh.session import DYNAMICS, Security, close_session, open_session
 from linkwind.bus.zenoh.stream import ZenohLogStream, matching, reply
 from linkwind.credentials import ROUTER, Identity
 from linkwind.protocol import refuse
@@ -112,4 +112,4 @@ class ZenohPlayer:
     def close(self) -> None:
         """Leave the bus, when everything published is on its way."""
         self.log.linger()
-        self._session.close()  # type: ignore[no-untyped-call]
+        close_session(self._session)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from linkwind.bus.zenoh.access import of_hub
-from linkwind.bus.zenoh.session import Security, open_router
+from linkwind.bus.zenoh.session import Security, close_session, open_router
 from linkwind.credentials import DYNAMICS, Identity
 
 
@@ -35,4 +35,4 @@ class ZenohRouter:
 
     def close(self) -> None:
         """Leave the bus."""
-        self._session.close()  # type: ignore[no-untyped-call]
+        close_session(self._session)

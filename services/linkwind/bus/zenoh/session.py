@@ -6,7 +6,9 @@ import json
 import os
 import re
 import socket
+import threading
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -132,6 +134,18 @@ def _open(
             f"zenoh: cannot {where}: {reason}. Expected a free endpoint such as tcp/127.0.0.1:7448; is "
             "another dynamics running there, is the address this machine's?"
         ) from error
+
+
+def close_session(session: zenoh.Session) -> None:
+    """Leave the bus; whoever cannot be told within a lease finds out by itself."""
+
+    def close() -> None:
+        with suppress(zenoh.ZError):  # some peer did not answer
+            session.close()  # type: ignore[no-untyped-call]
+
+    closing = threading.Thread(target=close, name="linkwind-close", daemon=True)
+    closing.start()
+    closing.join(LEASE)
 
 
 def _limit(message: str, key: str, size: int) -> dict[str, Any]:
