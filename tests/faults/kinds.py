@@ -16,7 +16,7 @@ from random import Random
 
 from linkwind.bus.base import PREFIX
 from linkwind.bus.zenoh import LARGEST, LEASE
-from tests.faults import containers
+from tests.faults import containers, recovered
 from tests.faults.programs import Programs
 from tests.faults.shutdown import COMMANDS, WAYS, stop
 from tests.faults.test_disk import on_a_disk_that_fails, on_a_full_disk
@@ -228,6 +228,8 @@ KINDS: dict[str, Kind] = {
     for side in ("aero", "dynamics")
     for name, number in (("killed", signal.SIGKILL), ("stopped", signal.SIGSTOP))
 } | {
+    "aero killed, comes back": lambda folder, chance: Trial(recovered.killed(folder, chance)),
+    "network cut, comes back": lambda folder, chance: Trial(recovered.cut_off(folder, chance)),
     "network cut, 0.1 to 10 s": cut,
     "late, then twice": twice,
     "hostile message, no TLS": struck,

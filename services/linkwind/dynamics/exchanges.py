@@ -12,7 +12,7 @@ from contextlib import contextmanager
 
 from linkwind.bus.base import DynamicsLink
 from linkwind.dynamics.recorder import MessageLog
-from linkwind.dynamics.recovery import NO_PATIENCE, Patience, Recovery
+from linkwind.dynamics.recovery import Patience, Recovery
 from linkwind.errors import LostError, StoppedError
 from linkwind.log.state import TimingEncoder
 from linkwind.protocol import DynamicsSession, fault
@@ -32,8 +32,8 @@ class Exchanges:
         session: DynamicsSession,
         link: DynamicsLink,
         log: MessageLog,
+        patience: Patience,
         poll: Callable[[], None] = lambda: None,
-        patience: Patience = NO_PATIENCE,
     ) -> None:
         """Prepare.
 
@@ -41,8 +41,8 @@ class Exchanges:
             session: the protocol's state.
             link: an open end of the bus that answers control requests with it.
             log: takes everything that is exchanged.
-            poll: is called now and then while waiting for providers to come and go; may raise to give up.
             patience: with providers that are lost.
+            poll: is called now and then while waiting for providers to come and go; may raise to give up.
         """
         self._session, self._link, self._log, self._poll = session, link, log, poll
         self.recovery = Recovery(session, link, patience, poll)

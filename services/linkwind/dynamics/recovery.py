@@ -15,6 +15,7 @@ from typing import NamedTuple
 from linkwind.bus.base import DynamicsLink
 from linkwind.errors import LostError
 from linkwind.protocol import DynamicsSession
+from linkwind.scenario import Scenario
 
 _log = logging.getLogger("linkwind")
 
@@ -46,12 +47,14 @@ class Patience:
         answer: … and more for each motion that it has to answer again [s].
     """
 
-    hello: float = 0.0
-    start: float = 60.0
-    answer: float = 2.0
+    hello: float
+    start: float
+    answer: float
 
-
-NO_PATIENCE = Patience()
+    @classmethod
+    def of(cls, scenario: Scenario) -> Patience:
+        """Return what a scenario says."""
+        return cls(scenario.bus.recovery, scenario.bus.start_timeout, scenario.coupling.timeout)
 
 
 @dataclass
@@ -162,7 +165,7 @@ class Recovery:
                         "let a supervisor do so (aero --stay, a restart policy); or raise bus.recovery"
                     )
                 continue
-            motions = len(known.past.answers) if known.past else 0
+            motions = len(known.past.answers) if known.past and known.here else 0
             limit = self._patience.start + motions * self._patience.answer
             if now > absence.hello_at + limit:
                 raise LostError(

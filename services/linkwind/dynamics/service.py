@@ -129,13 +129,11 @@ class DynamicsService:
             StoppedError: Ctrl-C or SIGTERM.
         """
         self._recorder = recorder
-        bus, timeout = self.scenario.bus, self.scenario.coupling.timeout
-        patience = Patience(bus.recovery, bus.start_timeout, timeout)
-        self._exchanges = Exchanges(self.session, link, recorder.log, poll, patience)
+        self._exchanges = Exchanges(self.session, link, recorder.log, Patience.of(self.scenario), poll)
         self._exchanges.recovery.returned = self.returned
         # A state that blows up is stopped by the core, with a reason; the log shows the way there.
         with self._exchanges.ended_for_all(), np.errstate(over="ignore", invalid="ignore"):
-            self._exchanges.await_providers(bus.start_timeout)
+            self._exchanges.await_providers(self.scenario.bus.start_timeout)
             start = time.perf_counter()
             final = self._march(progress)
             wall = time.perf_counter() - start

@@ -16,6 +16,7 @@ from linkwind.bus.base import DynamicsLink
 from linkwind.credentials import DYNAMICS, identity_in
 from linkwind.dynamics.exchanges import Exchanges
 from linkwind.dynamics.recorder import MessageLog, tables_sha256
+from linkwind.dynamics.recovery import Patience
 from linkwind.dynamics.service import digest
 from linkwind.errors import LogError
 from linkwind.log.contents import MOTION, STATE, STEP, WRENCH
@@ -80,7 +81,8 @@ class RecordedMotion:
             providers={live: log.provider_bodies[live]},
         )
         texts = {step: each.to_json() for step, each in changes.items()}
-        self.session.course = Course(scenario.log.checkpoint_every, changes=texts)
+        recovery = scenario.bus.recovery > 0.0
+        self.session.course = Course(scenario.checkpoint_every, changes=texts, recovery=recovery)
 
     def run(
         self, link: DynamicsLink, log: MessageLog, progress: Progress, poll: Callable[[], None] = lambda: None
@@ -97,7 +99,8 @@ class RecordedMotion:
             LinkwindError: the provider did not come, cannot go on, or was lost.
         """
         session, motion = self.session, self.session.motion
-        exchanges, loads = Exchanges(session, link, log, poll), Loads(self._log, session)
+        exchanges = Exchanges(session, link, log, Patience.of(self._scenario), poll)
+        loads = Loads(self._log, session)
         asked, stride = 0, max(1, self._steps // 200)
         with exchanges.ended_for_all():
             exchanges.await_providers(self._scenario.bus.start_timeout)

@@ -35,6 +35,7 @@ class Exchanging(Protocol):
 
     def control(self, request: bytes, asker: str) -> bytes: ...
     def refusal(self) -> bytes: ...
+    def seen(self, name: str) -> None: ...
     def where(self) -> str: ...
     @property
     def providers(self) -> Mapping[str, Sequence[str]]: ...
@@ -102,7 +103,9 @@ class ZenohDynamicsLink(Endpoint):
             query.reply(f"{PREFIX}/{self._exchanging.run}/refusal", self._exchanging.refusal())
 
     def _seen(self, name: str, present: bool) -> None:
-        if not present and name in self._exchanging.not_gone:
+        if present:
+            self._exchanging.seen(name)
+        elif name in self._exchanging.not_gone:
             self._fail(
                 LostError(
                     f'"{name}" was lost at {self._exchanging.where()}: its process ended, was stopped for '
