@@ -21,7 +21,10 @@ class MortalLink:
     Attributes:
         moments: at which each provider could have died so far: between any two things that others can see.
         lives: processes of each provider so far.
+        told: how often a loss is told: one whose lease is over may be back for a moment before it ends.
     """
+
+    told = 1
 
     def __init__(
         self, session: DynamicsSession, make: Make, deaths: Mapping[str, Collection[int]], limit: int = 1000
@@ -83,7 +86,7 @@ class MortalLink:
             raise self._session.failure from None
 
     def _lost(self, name: str) -> None:
-        self._losses.append(LostError(f'"{name}" was lost', name))
+        self._losses.extend([LostError(f'"{name}" was lost', name)] * self.told)
 
     def wait(self, done: Callable[[], bool], timeout: float, poll: Callable[[], None]) -> bool:
         while True:

@@ -221,6 +221,15 @@ def test_many_deaths(scheme: str, data: st.DataObject, tmp_path_factory: pytest.
     assert verify(*scenario_of(done.log)).identical
 
 
+def test_a_loss_that_is_told_again_is_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(MortalLink, "told", 3)
+    undisturbed, link = fly(scenario(), tmp_path / "undisturbed", {})
+    for moment in range(2, link.moments["left"], 7):
+        done, disturbed = fly(scenario(), tmp_path / str(moment), {"left": {moment}})
+        assert disturbed.lives["left"] == 2
+        check_same(done, undisturbed)
+
+
 def test_before_the_first_checkpoint_it_begins_again(tmp_path: Path) -> None:
     what = scenario(every=1000)
     undisturbed, link = fly(what, tmp_path / "undisturbed", {})

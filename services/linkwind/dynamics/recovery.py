@@ -47,9 +47,9 @@ class Patience:
         answer: … and more for each motion that it has to answer again [s].
     """
 
-    hello: float
-    start: float
-    answer: float
+    hello: float = 0.0
+    start: float = 60.0
+    answer: float = 2.0
 
     @classmethod
     def of(cls, scenario: Scenario) -> Patience:
@@ -125,7 +125,10 @@ class Recovery:
         if not (loss.provider and self._patience.hello):
             raise loss
         name, now = loss.provider, time.monotonic()
-        answer, last = self._session.participants[name].payload, self._attempts.get(name)
+        known, last = self._session.participants[name], self._attempts.get(name)
+        if name in self._absent and not known.instance:
+            return  # the same one: its lease was over, it was on the bus again for a moment, and has ended
+        answer = known.payload
         attempts = last[1] + 1 if last and last[0] == answer else 1
         self._attempts[name] = answer, attempts
         if attempts == ATTEMPTS:

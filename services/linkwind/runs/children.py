@@ -77,11 +77,12 @@ class Children:
         """
         for name, child in self._children.items():
             status, known = child.process.poll(), self._session.participants[name]
-            lost = known.losses > child.losses
-            # One that takes part and has ended is about to be seen lost.
-            if not (lost or status) or (self._session.course.recovery and known.ready):
-                continue
-            if self._session.course.recovery and child.again(known.losses, known.payload):
+            if self._session.course.recovery:
+                # One that is on the bus, and has ended, is about to be seen lost.
+                ended = known.losses > child.losses or (status and not known.here)
+                if not ended or child.again(known.losses, known.payload):
+                    continue
+            elif not status:
                 continue
             lines = child.output.read_text(errors="replace").strip().splitlines()
             raise LostError(

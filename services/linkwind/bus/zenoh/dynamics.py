@@ -35,7 +35,7 @@ class Exchanging(Protocol):
 
     def control(self, request: bytes, asker: str) -> bytes: ...
     def refusal(self) -> bytes: ...
-    def seen(self, name: str) -> None: ...
+    def seen(self, name: str, present: bool) -> None: ...
     def where(self) -> str: ...
     @property
     def providers(self) -> Mapping[str, Sequence[str]]: ...
@@ -103,9 +103,8 @@ class ZenohDynamicsLink(Endpoint):
             query.reply(f"{PREFIX}/{self._exchanging.run}/refusal", self._exchanging.refusal())
 
     def _seen(self, name: str, present: bool) -> None:
-        if present:
-            self._exchanging.seen(name)
-        elif name in self._exchanging.not_gone:
+        self._exchanging.seen(name, present)
+        if not present and name in self._exchanging.not_gone:
             self._fail(
                 LostError(
                     f'"{name}" was lost at {self._exchanging.where()}: its process ended, was stopped for '
@@ -119,7 +118,8 @@ class ZenohDynamicsLink(Endpoint):
         if resend_at is not None and now > resend_at:
             self._resend_at = now + 2.0 * (now - self._posted_at)
             self._outgoing.put(self._unsure_motion)
-        if now - self._waiting_since > self._timeout:
+        # Whoever is lost has not answered either, and may come back.
+        if not self._troubles and now - self._waiting_since > self._timeout:
             late = " and ".join(f'"{name}"' for name in self._exchanging.unanswered)
             self._fail(
                 AnswerTimeoutError(
