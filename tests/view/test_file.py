@@ -165,6 +165,22 @@ def test_a_cut_log_is_shown_as_far_as_it_goes(browser, logs):
         browser.until(f"Math.abs({T} - {last}) < 1e-9")
 
 
+def test_a_log_that_the_run_s_next_one_has_replaced_is_followed(logs, tmp_path):
+    data, path = logs["planar"].read_bytes(), tmp_path / "log.mcap"
+    path.write_bytes(data[: 2 * len(data) // 3])
+    recording = recordings.Recording(path)
+    before = recording.progress()
+    assert not before["ended"]
+    (tmp_path / "next.mcap").write_bytes(data)
+    (tmp_path / "next.mcap").replace(path)
+    after = recording.progress()
+    assert before["last"] < after["last"]
+    assert after["complete"]
+    assert recording.window(0.0, 1.0)["scene"] == recordings.Recording(path).window(0.0, 1.0)["scene"]
+    path.rename(tmp_path / "elsewhere.mcap")
+    assert recording.progress() == after
+
+
 def test_a_phone_needs_no_sideways_scrolling(page):
     size = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
     page.send("Emulation.setDeviceMetricsOverride", **size)

@@ -86,6 +86,13 @@ class Index:
             self._walk()
         return self._at != before
 
+    def has_name(self, path: Path) -> bool:
+        """Tell whether the file still has its name, or no other has it."""
+        try:
+            return path.stat().st_ino == os.fstat(self._file).st_ino
+        except FileNotFoundError:
+            return True
+
     def records(self, chunk: ChunkAt) -> bytes:
         """Return the records of a chunk; none, and a gap in the contents, if its checksum is wrong."""
         place, size = chunk.span.start, chunk.span.end - chunk.span.start

@@ -46,6 +46,11 @@ class SeekableLog(Head):
         return self._index.grow()
 
     @property
+    def replaced(self) -> bool:
+        """Whether another log has its name now: that of the same run, which goes on."""
+        return not self._index.has_name(self.path)
+
+    @property
     def trouble(self) -> str | None:
         """What was found damaged so far, for people."""
         gaps = self._contents.gaps

@@ -92,6 +92,8 @@ class Recording:
     def progress(self) -> dict[str, Any]:
         """Return how far the log has come: first and last time of a state [s], and how the run ended."""
         with self.lock:
+            if self.log.replaced:
+                self.log = open_seekable(self.log.path)
             self.log.refresh()
             extent, ending = self.log.extent(STATE), self.log.ending
             first, last = extent if extent is not None else (None, None)
