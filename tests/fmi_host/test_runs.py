@@ -113,6 +113,8 @@ def test_files_and_scenarios_that_do_not_fit(tmp_path):
         load_with("two_link", [f'providers.aero.fmu.sha256="{"0" * 64}"'], [str(file)])
     result = CliRunner().invoke(app, ["run", "two_link", "--set", "providers.aero.model=fmu"])
     assert "Add --force-fmu aero=FILE" in str(result.exception)
+    with pytest.raises(InputError, match=r"--force-fmu areo=.*expected a provider of .*, aero; got areo"):
+        load_with("two_link", [], [f"areo={file}"])
     scenario = load("two_link")
     with pytest.raises(InputError, match=r'aero\.model: expected "fmu" for .*--set aero\.model=fmu'):
         aero.build(scenario, scenario.providers[0], file)

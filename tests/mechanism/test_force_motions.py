@@ -351,6 +351,7 @@ MOTOR = {"type": "actuator", "name": "motor", "joint": "pin", "force": "0"}
         ([MOTOR | {"force": {"table": [[0, 0], [1, 1]], "periodic": True}}], r"\[1\]: expected a last value"),
         ([MOTOR | {"coordinate": 1}], r"forces\[0\]\.coordinate: expected 0, because a revolute"),
         ([MOTOR | {"force": "2*x"}], r"forces\[0\]\.force: column 3: expected one of t, q, v"),
+        ([FLAP | {"position": "sin(x)"}], r'expected one of t, pi; got "x"\. Use one of these\.'),
         ([FLAP | {"position": "sin(t"}], r"forces\[0\]\.position: expected an expression"),
         ([FLAP | {"position": "log(t)"}], r"forces\[0\]\.position: expected a number with a rate"),
         ([FLAP | {"position": {"table": [[0, 0], [1, 1]]}}], r'interpolation: expected "cubic"'),
@@ -362,6 +363,16 @@ MOTOR = {"type": "actuator", "name": "motor", "joint": "pin", "force": "0"}
 def test_what_does_not_fit_is_refused(forces, message):
     with pytest.raises(LinkwindError, match=message):
         build(scenario([ROD], [PIN], forces))
+
+
+def test_a_motion_of_a_joint_without_single_coordinates_is_refused():
+    ball, flight = PIN | {"type": "spherical"}, PIN | {"type": "free", "child_point": [0.0, 0.0]}
+    solid = ROD | {"inertia": [0.1, 0.2, 0.3, 0, 0, 0]}
+    for joint in (ball, flight):
+        with pytest.raises(
+            MechanismError, match=r"forces\[0\]\.joint: expected a revolute, .*which is (sph|free)"
+        ):
+            build(scenario([solid], [joint], [FLAP]))
 
 
 def test_a_motion_against_the_stated_start_is_refused():

@@ -37,6 +37,12 @@ def test_transport_and_run_id_make_no_difference(log: Path, tmp_path: Path) -> N
     assert found.points == STEPS + 1
 
 
+def test_the_folder_of_a_run_stands_for_its_log(log: Path) -> None:
+    for command in (["diff", str(log), str(log.parent)], ["verify", str(log.parent)]):
+        result = CliRunner().invoke(app, command)
+        assert (result.exit_code, "identical" in result.output) == (0, True)
+
+
 @pytest.mark.parametrize(
     ("topic", "number", "field", "element", "body"),
     [

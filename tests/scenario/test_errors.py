@@ -231,6 +231,8 @@ def test_several_problems_are_reported_a_line_each_the_first_few():
     [
         ("two_lnk", "two_lnk: expected a file or one of andrews, ", 'Use "two_link".'),
         ("no/such/file.toml", "no/such/file.toml: expected a file or one of ", "Check the path."),
+        ("andrew", "andrew: expected a file or one of ", 'Use "andrews".'),
+        ("/", "/: expected a file or one of ", "got: Is a directory. Check the path."),
         ("a\0b", "a\0b: expected a file or one of ", "Check the path."),
     ],
 )

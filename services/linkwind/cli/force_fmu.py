@@ -69,6 +69,11 @@ def _named(scenario: Scenario, text: str) -> tuple[str, Path]:
     name, equals, file = text.partition("=")
     if equals and name in names:
         return name, Path(file)
+    if equals and not Path(text).exists():
+        raise InputError(
+            f"--force-fmu {text}: expected a provider of {scenario.source} before the =, "
+            f"{', '.join(names) or '(there is none)'}; got {name}. Correct it."
+        )
     wanting = [provider.name for provider in scenario.providers if provider.model == "fmu"]
     choices = wanting if len(wanting) == 1 else ["aero"] if "aero" in names else names
     if len(choices) == 1:

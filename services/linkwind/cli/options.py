@@ -7,10 +7,20 @@ from typing import Annotated
 
 import typer
 
+LOG = "log.mcap"  # in the folder of a run
 DIFFERENT = 5  # exit code: two things that should be equal are not
 
 ScenarioArgument = Annotated[str, typer.Argument(help="A built-in scenario's name, or a TOML file.")]
-LogArgument = Annotated[Path, typer.Argument(help="The MCAP log of a run.")]
+
+
+def log_in(path: Path) -> Path:
+    """Return the log that a path stands for: a file, or the folder of a run with its ``log.mcap``."""
+    return path / LOG if path.is_dir() else path
+
+
+LogArgument = Annotated[
+    Path, typer.Argument(help="The MCAP log of a run, or the run's folder.", callback=log_in)
+]
 OutOption = Annotated[
     Path | None, typer.Option("--out", help="Folder for the results; a new one under runs/ if not given.")
 ]

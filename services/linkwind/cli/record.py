@@ -32,7 +32,7 @@ def record(
     run: Annotated[str, typer.Option(help="Id of the run; * for the only one there.")] = "*",
     out: OutOption = None,
     tls: TlsOption = None,
-    start_timeout: Annotated[float, typer.Option(min=0.0, help="Wait this long for the run [s].")] = 60.0,
+    start_timeout: Annotated[float, typer.Option(min=0.0, help="Wait so many seconds for the run.")] = 60.0,
     as_json: JsonOption = False,
 ) -> None:
     """Record a run that was started elsewhere, without disturbing it; exit code 4 if messages were missed.

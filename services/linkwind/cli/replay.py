@@ -39,8 +39,8 @@ def replay(
     rate: Annotated[
         float, typer.Option(min=0.0, help="Times as fast as in reality; 0 for as fast as possible.")
     ] = 1.0,
-    start: Annotated[float | None, typer.Option(help="Begin at this simulation time [s].")] = None,
-    end: Annotated[float | None, typer.Option(help="End at this simulation time [s].")] = None,
+    start: Annotated[float | None, typer.Option(help="Begin at this simulation time, in s.")] = None,
+    end: Annotated[float | None, typer.Option(help="End at this simulation time, in s.")] = None,
     topics: Annotated[
         list[str] | None,
         typer.Option(metavar="TOPIC,…", help="Only these topics, such as /motion,/wrench/aero."),

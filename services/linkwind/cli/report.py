@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from linkwind.cli.options import LogArgument
+
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
@@ -14,7 +16,7 @@ def register(app: typer.Typer) -> None:
 
 
 def report(
-    log: Annotated[Path, typer.Argument(help="The MCAP log of a run.")],
+    log: LogArgument,
     out: Annotated[
         Path | None, typer.Option("--out", help="The page; report.html beside the log if not given.")
     ] = None,

@@ -37,7 +37,7 @@ def aero(
         Path | None, typer.Option(help="The FMU, for a provider whose model is fmu; its path stays here.")
     ] = None,
     start_timeout: Annotated[
-        float, typer.Option(min=0.0, help="Wait this long for the dynamics [s].")
+        float, typer.Option(min=0.0, help="Wait so many seconds for the dynamics.")
     ] = 60.0,
     tls: TlsOption = None,
     stay: Annotated[

@@ -29,7 +29,7 @@ def register(app: typer.Typer) -> None:
 
 
 def flow(
-    short: Annotated[bool, typer.Option("--short", help="A coarser form, below 3 minutes.")] = False,
+    short: Annotated[bool, typer.Option("--short", help="A coarser form, some 2 minutes.")] = False,
     case: CaseOption = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="Folder for flow.html: the table and plots.")
@@ -38,7 +38,7 @@ def flow(
 ) -> None:
     """Compare the model flow with published and exact values; exit code 5 if one is off.
 
-    All of it takes some 15 minutes on one core.
+    All of it takes some 6 minutes on two cores.
 
     Example: linkwind validate flow --short --out validation
     """

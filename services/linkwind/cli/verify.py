@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from linkwind.cli.force_fmu import ForceFmuOption, files_by_provider, refuse_missing
-from linkwind.cli.options import DIFFERENT, JsonOption, LogArgument
+from linkwind.cli.options import DIFFERENT, JsonOption, LogArgument, log_in
 
 if TYPE_CHECKING:
     from linkwind.log.reader import Log
@@ -96,8 +96,10 @@ def _show(log: Log, steps: int, found: Verified) -> None:
 
 
 def diff(
-    one: Annotated[Path, typer.Argument(metavar="A", help="The MCAP log of a run.")],
-    other: Annotated[Path, typer.Argument(metavar="B", help="The MCAP log of another run.")],
+    one: Annotated[
+        Path, typer.Argument(metavar="A", help="The MCAP log of a run, or the run's folder.", callback=log_in)
+    ],
+    other: Annotated[Path, typer.Argument(metavar="B", help="Those of another run.", callback=log_in)],
     rtol: Annotated[
         float, typer.Option(min=0.0, help="Ignore differences up to this part of a field's largest value.")
     ] = 0.0,
@@ -106,7 +108,7 @@ def diff(
 ) -> None:
     """Show what differs between two logs, where it starts and how it grows; exit code 5 if they differ.
 
-    Example: linkwind diff runs/a/log.mcap runs/b/log.mcap --rtol 1e-9
+    Example: linkwind diff runs/a runs/b --rtol 1e-9
     """
     from linkwind.runs.diff import diff as compare
 

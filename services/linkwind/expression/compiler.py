@@ -50,7 +50,7 @@ class Program:
 
 
 def compile_program(
-    let: Mapping[str, str],
+    let: Mapping[str, str] | None,
     results: Mapping[str, str | Curve],
     item: str,
     *,
@@ -60,7 +60,7 @@ def compile_program(
     """Return the program that gives some results.
 
     Args:
-        let: named expressions in order; each may use those before it.
+        let: named expressions in order; each may use those before it. None: there is no place for them.
         results: expressions of some of the components, or curves over the first variable.
         item: where they stand, for errors: ``two_link.toml: aero.field.link1``.
         variables: names that expressions may use, in the order that the program is given them.
@@ -69,8 +69,8 @@ def compile_program(
     Raises:
         ExpressionError: a name or an expression is wrong.
     """
-    compiler = _Compiler(variables)
-    for name, text in let.items():
+    compiler = _Compiler(variables, defines=let is not None)
+    for name, text in (let or {}).items():
         here = f"{item}.let.{name}"
         _check_name(name, here, variables)
         compiler.compile(text, here)
@@ -97,8 +97,9 @@ def _check_name(name: str, item: str, variables: Sequence[str]) -> None:
 class _Compiler:
     """Emits postfix code for syntax trees, and watches the machine's limits."""
 
-    def __init__(self, variables: Sequence[str]) -> None:
+    def __init__(self, variables: Sequence[str], *, defines: bool) -> None:
         self._variables = variables
+        self._defines = defines
         self.code: list[tuple[Operation, int]] = []
         self.constants: list[float] = []
         self.locals: dict[str, int] = {}
@@ -182,7 +183,7 @@ class _Compiler:
             raise self._source.error(node, f"{name}(…)", f'"{name}"', "Give the function its argument.")
         else:
             known = (*self._variables, *CONSTANTS, *self.locals)
-            hint = "Define it in let before it is used."
+            hint = "Define it in let before it is used." if self._defines else "Use one of these."
             raise self._unknown(node, "one of", known, name, hint)
         return 1
 

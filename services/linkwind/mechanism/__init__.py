@@ -67,7 +67,7 @@ def build(scenario: Scenario) -> Mechanism:
     carried, loops = carriers(scenario)
     bodies: dict[int, Start] = {WORLD: WORLD_START}
     joints: dict[int, JointStart] = {}
-    moved = prescribed(scenario)
+    moved = prescribed(scenario, carried)
     for i in order([carrier.parent for carrier in carried]):
         item = f"{scenario.source}: bodies[{i}]"
         given = moved.get(carried[i].name, {})

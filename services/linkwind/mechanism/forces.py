@@ -130,17 +130,18 @@ def _element(force: Force, scenario: Scenario, carriers: list[Carrier], start: M
             )
 
 
-def prescribed(scenario: Scenario) -> dict[str, dict[int, tuple[float, float]]]:
+def prescribed(scenario: Scenario, carriers: list[Carrier]) -> dict[str, dict[int, tuple[float, float]]]:
     """Return what motions say about the start: by joint and number of the coordinate, value and rate.
 
     Raises:
-        MechanismError, ExpressionError: a motion is wrong, or not a number.
+        MechanismError, ExpressionError: a motion is wrong, does not fit its joint, or is not a number.
     """
     found: dict[str, dict[int, tuple[float, float]]] = {}
     for i, force in enumerate(scenario.forces):
         if not isinstance(force, Prescribed):
             continue
         item = f"{scenario.source}: forces[{i}]"
+        _coordinate(force, carriers, item)
         program = motion_program(force, item)
         start = derivatives(program.code, program.constants, 0.0)
         if not all(map(math.isfinite, start)):
@@ -174,7 +175,7 @@ def motion_program(motion: Prescribed, item: str) -> Program:
 def _program(force: Force, keys: tuple[str, ...], item: str) -> Program:
     functions = {key: getattr(force, key) for key in keys}
     return compile_program(
-        getattr(force, "let", {}),
+        getattr(force, "let", None),
         {key: _law(function) for key, function in functions.items() if function is not None},
         item,
         variables=VARIABLES[force.type],
@@ -226,7 +227,7 @@ def _coordinate(force: Actuator | Prescribed, carriers: list[Carrier], item: str
     if carrier.type not in ("revolute", "prismatic", "planar"):
         raise MechanismError(
             f'{item}.joint: expected a revolute, prismatic or planar joint; got "{force.joint}", which is '
-            f"{carrier.type}. Name another."
+            f"{carrier.type}. Name another, or put revolute joints in a row, bodies without mass between."
         )
     if force.coordinate >= NQ[carrier.type]:
         raise MechanismError(

@@ -51,7 +51,7 @@ def load(source: str | Path, overrides: Sequence[str] = ()) -> Scenario:
             f"{path}: expected text in UTF-8; got a wrong byte at position {error.start}. Save it as UTF-8."
         ) from None
     except (OSError, ValueError) as error:  # ValueError: a null byte in the path
-        near = nearest(str(source), builtin_names())
+        near = nearest(str(source), builtin_names()) if isinstance(error, FileNotFoundError) else None
         reason = error.strerror if isinstance(error, OSError) else str(error)
         advice = f'Use "{near}".' if near else "Check the path."
         raise ScenarioError(
