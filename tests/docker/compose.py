@@ -104,10 +104,10 @@ class Project:
         (folder,) = self.folders["runs"].iterdir()
         return folder
 
-    def await_steps(self) -> None:
-        """Return as soon as the growing log shows that the run goes on, again if it did before."""
+    def await_steps(self, more: int = 1_000_000) -> None:
+        """Return as soon as the log has so many more bytes, than at the last kill if there was one."""
         deadline = time.monotonic() + PATIENCE
-        goal = self._seen + 1_000_000
+        goal = self._seen + more
         while max((log.stat().st_size for log in self._logs()), default=0) < goal:
             assert time.monotonic() < deadline, f"the run did not get under way: {self.do('logs')[1]}"
             ended = self._started[-1].poll()

@@ -41,8 +41,7 @@ def killed(folder: Path, chance: Random) -> float:
     try:
         status, said = project.do("up", "--detach", END=END, RESTART="on-failure:5")
         assert status == 0, said
-        project.await_steps()
-        time.sleep(chance.uniform(0.0, 1.5))
+        project.await_steps(int(chance.uniform(0.05, 0.7) * whole.log.stat().st_size))
         project.kill(chance.choice(["dynamics", "aero"]))
         began = time.monotonic()
         project.await_steps()
