@@ -17,6 +17,7 @@ STEPS = 1_000_000
 WARM = 0.2  # share of the steps, or of the time, after which nothing may grow
 STEP_BYTES = 2170  # of the log
 POOL = 2  # threads that zenoh may have more or less of at a time
+LOOK = 1.5  # s between two looks; meanwhile the log grows
 INDEX = 10  # bytes that the log's index holds in memory for each step of the dynamics
 
 
@@ -43,17 +44,19 @@ def main(seconds: float) -> int:
             dynamics = programs.dynamics(f"time.end={STEPS // 1000}")
             sides = {"dynamics": dynamics, "aero": programs.aero()}
             programs.await_steps()
-            began, before, after = time.monotonic(), {}, {}
+            began, before, after, seen, size = time.monotonic(), {}, {}, {}, 0
             while dynamics.poll() is None and (passed := time.monotonic() - began) < seconds:
-                size = programs.log().stat().st_size
+                size, last = programs.log().stat().st_size, size
                 if not before and max(passed / seconds, size / (STEPS * STEP_BYTES)) > WARM:
                     before = {name: use(process.pid) for name, process in sides.items()}
                     first = size
-                if before and sides["aero"].poll() is None:
-                    after = {name: use(process.pid) for name, process in sides.items()}
-                time.sleep(0.2)
+                if before and size > last:  # it went on after that look
+                    after = seen
+                seen = {name: use(process.pid) for name, process in sides.items()}
+                time.sleep(LOOK)
             dynamics.send_signal(signal.SIGINT)
-            dynamics.communicate()
+            _, said = dynamics.communicate()
+            assert dynamics.returncode in (0, 130), said
             log = open_log(programs.log())
             warm = round(log.steps * first / programs.log().stat().st_size)
             steps = log.steps - warm

@@ -71,7 +71,7 @@ class ZenohDynamicsLink(Endpoint):
         base = f"{PREFIX}/{key_segment(session.run, '--run')}"
         security = Security(identity, of_hub(session.providers, ROUTER)) if identity else None
         bodies = max(map(len, session.providers.values()), default=0)
-        limits = {f"{base}/wrench/*": _largest_wrench(bodies)}
+        limits = {f"{base}/wrench/*": largest_wrench(bodies)}
         super().__init__(listen, connect, DYNAMICS, security, limits)
         self._exchanging = session
         self._timeout = timeout
@@ -186,7 +186,7 @@ class ZenohDynamicsLink(Endpoint):
         return _taken(self._kept)
 
 
-def _largest_wrench(bodies: int) -> int:
+def largest_wrench(bodies: int) -> int:
     """Return what the wrench on so many bodies may need, every matrix included [bytes]."""
     return 2**16 + 8 * (6 * bodies + 36 * bodies + 36 * bodies**2)
 

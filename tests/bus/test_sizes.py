@@ -1,0 +1,41 @@
+"""How large a message may be: every good one fits, and what does not is refused where it is made, by name.
+
+``python -m tests.faults`` sends far larger ones into a run.
+"""
+
+from __future__ import annotations
+
+from contextlib import closing
+
+import pytest
+
+from linkwind.bus.zenoh import LARGEST, ZenohProviderLink, loopback_endpoint
+from linkwind.bus.zenoh.dynamics import largest_wrench
+from linkwind.bus.zenoh.session import LARGEST_MOTION
+from linkwind.errors import SimulationError
+from linkwind.messages import MotionMessage, WrenchMessage
+
+NUMBERS = ["a number"] * 1000
+RUN = "r" * 1000
+
+
+@pytest.mark.parametrize("bodies", [1, 2, 10, 200])
+def test_every_wrench_fits(bodies: int) -> None:
+    full = WrenchMessage(
+        RUN, RUN, bodies, added_inertia=True, response_size=36 * bodies**2, diagnostics=NUMBERS
+    )
+    assert 8 * 36 * bodies**2 < len(full.payload()) < largest_wrench(bodies)
+
+
+def test_motion_of_thirty_thousand_bodies_fits() -> None:
+    assert len(MotionMessage(RUN, 30_000).payload()) < LARGEST_MOTION
+
+
+def test_checkpoint_that_is_too_large_is_refused() -> None:
+    endpoint = loopback_endpoint()
+    with closing(ZenohProviderLink([endpoint], [], name="aero")) as link:
+        link.join("run")
+        with pytest.raises(
+            SimulationError, match=r"checkpoint: expected at most 268 MB; got 268 MB\. Use a sma"
+        ):
+            link.keep(bytes(LARGEST))
