@@ -35,7 +35,5 @@ def test_checkpoint_that_is_too_large_is_refused() -> None:
     endpoint = loopback_endpoint()
     with closing(ZenohProviderLink([endpoint], [], name="aero")) as link:
         link.join("run")
-        with pytest.raises(
-            SimulationError, match=r"checkpoint: expected at most 268 MB; got 268 MB\. Use a sma"
-        ):
+        with pytest.raises(SimulationError, match="checkpoint: expected at most 268 MB; got 268 MB"):
             link.keep(bytes(LARGEST))

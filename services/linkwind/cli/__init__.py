@@ -5,6 +5,8 @@ from __future__ import annotations
 import atexit
 import os
 import sys
+import traceback
+from contextlib import suppress
 
 import typer
 from typer.models import CommandInfo, TyperInfo
@@ -83,6 +85,9 @@ def main() -> None:
         status = StoppedError.exit_code
     except SystemExit as end:
         status = end.code if isinstance(end.code, int) else int(end.code is not None)
+    except Exception:
+        traceback.print_exc()
+        status = 1
     _leave(status)
 
 
@@ -93,6 +98,7 @@ def _leave(status: int) -> None:
     closed, when the process was told to stop, or whose peers do not answer.
     """
     atexit._run_exitfuncs()  # children and temporary files
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError):  # nobody reads it any more
+            stream.flush()
     os._exit(status)
