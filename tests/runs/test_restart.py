@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
@@ -196,6 +197,35 @@ def test_without_a_folder_the_newest_run_goes_on(
         fourth = started(scenario, None)
     assert isinstance(fourth, Outcome)
     assert len(list(runs.glob("two_link_field-2*"))) == 3
+
+
+def test_a_provider_of_the_dead_dynamics_that_goes_now_is_no_loss(
+    scenario: Scenario, whole: Outcome, tmp_path: Path
+) -> None:
+    """One that was busy when its dynamics died, and hears of it when the next is there."""
+    log = left(whole, tmp_path / "out", 150)
+    endpoint, met = loopback_endpoint(), threading.Event()
+    stale = ZenohProviderLink([endpoint], [], name="aero")
+    stale.join("out")
+
+    def leave() -> None:
+        deadline = time.monotonic() + PATIENCE
+        while not any(True for _ in stale._session.info.peers_zid()) and time.monotonic() < deadline:
+            time.sleep(0.01)
+        time.sleep(0.3)  # for its token to be seen
+        met.set()
+        stale.close()
+        time.sleep(0.3)
+        with closing(ZenohProviderLink([endpoint], [], name="aero")) as link:
+            serve(link, session("aero"), PATIENCE)
+
+    thread = threading.Thread(target=leave)
+    thread.start()
+    done = restart(scenario, log.parent, lambda step: None, Ends([endpoint], []))
+    thread.join(PATIENCE)
+    assert met.is_set()
+    assert isinstance(done, Resumed)
+    assert messages(log) == messages(whole.log)
 
 
 def test_resume_meets_providers_that_are_elsewhere(whole: Outcome, tmp_path: Path) -> None:

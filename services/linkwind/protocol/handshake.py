@@ -305,6 +305,11 @@ class HandShake:
         return [p.name for p in self.participants.values() if not p.rollback]
 
     @property
+    def taking_part(self) -> list[str]:
+        """Providers that have said Hello to this dynamics, and not Bye; not those of one that is dead."""
+        return [p.name for p in self.participants.values() if p.instance and not p.bye]
+
+    @property
     def not_gone(self) -> list[str]:
         """Providers that have not said Bye."""
         return [p.name for p in self.participants.values() if not p.bye]

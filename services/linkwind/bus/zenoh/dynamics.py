@@ -42,7 +42,7 @@ class Exchanging(Protocol):
     @property
     def unanswered(self) -> Sequence[str]: ...
     @property
-    def not_gone(self) -> Sequence[str]: ...
+    def taking_part(self) -> Sequence[str]: ...
 
 
 class ZenohDynamicsLink(Endpoint):
@@ -104,7 +104,7 @@ class ZenohDynamicsLink(Endpoint):
 
     def _seen(self, name: str, present: bool) -> None:
         self._exchanging.seen(name, present)
-        if not present and name in self._exchanging.not_gone:
+        if not present and name in self._exchanging.taking_part:
             self._fail(
                 LostError(
                     f'"{name}" was lost at {self._exchanging.where()}: its process ended, was stopped for '
