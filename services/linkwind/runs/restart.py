@@ -104,7 +104,7 @@ def restart(
             return _finished(log)
         found = _plan(log, scenario)
         goes_on(found)
-        return resume_here(found, progress, ends, watch, listened=listened)
+        return resume_here(found, progress, ends, watch, listened=listened, release=stack.close)
 
 
 def _unfinished(scenario: Scenario) -> Path | None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -176,13 +176,19 @@ def resume_elsewhere(
 
 
 def resume_here(
-    found: Plan, progress: Progress, ends: Ends, watch: Watch | None = None, *, listened: bool = False
+    found: Plan,
+    progress: Progress,
+    ends: Ends,
+    watch: Watch | None = None,
+    *,
+    listened: bool = False,
+    release: Callable[[], None] = lambda: None,
 ) -> Resumed:
     """Go on with a run in its own folder, with providers that are started elsewhere; see :func:`resume`.
 
     The new log takes the place of the old one as soon as it holds as much (:mod:`linkwind.runs.successor`).
     """
-    successor = Successor(found.log, lambda: watch is None or watch.opened)
+    successor = Successor(found.log, lambda: watch is None or watch.opened, release)
     service, beginning = _continued(found, successor)
     try:
         folder = found.log.path.parent

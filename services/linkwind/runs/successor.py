@@ -25,17 +25,20 @@ class Successor:
         path: of the new one, until it gets the name of the old one.
     """
 
-    def __init__(self, old: Log, ready: Callable[[], bool] = lambda: True) -> None:
+    def __init__(
+        self, old: Log, ready: Callable[[], bool] = lambda: True, release: Callable[[], None] = lambda: None
+    ) -> None:
         """Begin beside ``old``; what an earlier attempt left there goes away, ``old`` holds more.
 
         Args:
             old: the log before.
             ready: whether nobody needs the path of the new one any more.
+            release: is called when the old one is gone, to let go of it, so that its space is free.
         """
         self.path = old.path.with_name(NAME)
         self.path.unlink(missing_ok=True)
         self._old: Log | None = old
-        self._ready = ready
+        self._ready, self._release = ready, release
         self._last_ns = max((time_ns for _, _, time_ns, _ in old.messages(MOTION)), default=-1)
 
     def reached(self, log: LogWriter, time_ns: int) -> None:
@@ -55,6 +58,7 @@ class Successor:
         _sync(self._old.path.parent)
         log.path = self._old.path
         self._old.close()
+        self._release()
         self._old = None
 
     def end(self) -> None:
