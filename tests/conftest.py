@@ -17,6 +17,7 @@ SLOW = (
     "tests/faults/test_recovery.py::test_a_flow",
     "tests/faults/test_recovery.py::test_another",
     "tests/faults/test_recovery.py::test_many",
+    "tests/faults/test_recovery.py::test_one_that_comes_back_is_killed",
     "tests/faults/test_recovery.py::test_over_tls",
     "tests/fmi/test_platforms.py",
     "tests/fmi_host/test_wine.py",

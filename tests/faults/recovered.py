@@ -38,10 +38,15 @@ def unharmed(process: subprocess.Popen[str], log: Path) -> dict[str, Any]:
     return summary
 
 
+def children_of(run: subprocess.Popen[str]) -> list[int]:
+    """Return the processes of a run's providers."""
+    return [int(child) for child in Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text().split()]
+
+
 def child_of(run: subprocess.Popen[str]) -> int:
     """Return the process of a run's only provider."""
-    (child,) = Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text().split()
-    return int(child)
+    (child,) = children_of(run)
+    return child
 
 
 def under_way(log: Path) -> None:
@@ -65,6 +70,26 @@ def hit(
         os.kill(child_of(run), number)
         (back,) = unharmed(run, programs.log())["returns"]
         return float(back["after_s"])
+    finally:
+        programs.end()
+
+
+def hit_twice(folder: Path, after: float) -> None:
+    """Kill the provider of a run, and the next one so soon [s] that it is still on its way."""
+    programs = Programs(folder)
+    try:
+        options = [f"--set={setting}" for setting in LONG]
+        run = programs.start("run", "two_link", "--out", "out", "--json", *options)
+        under_way(programs.log())
+        first = child_of(run)
+        os.kill(first, signal.SIGKILL)
+        deadline = time.monotonic() + PATIENCE
+        while not (next_ones := set(children_of(run)) - {first}):
+            assert time.monotonic() < deadline, "it was not started again"
+            time.sleep(0.005)
+        time.sleep(after)
+        os.kill(next_ones.pop(), signal.SIGKILL)
+        assert 1 <= len(unharmed(run, programs.log())["returns"]) <= 2
     finally:
         programs.end()
 

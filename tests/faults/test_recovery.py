@@ -16,7 +16,7 @@ from linkwind.bus.zenoh import LEASE
 from linkwind.credentials.authority import DEFAULT_ROLES, issue
 from linkwind.runs.run import run
 from linkwind.scenario import load
-from tests.faults.recovered import LONG, child_of, cut, hit, killed, under_way, unharmed
+from tests.faults.recovered import LONG, child_of, cut, hit, hit_twice, killed, under_way, unharmed
 from tests.faults.test_processes import Programs, finish
 from tests.networks.namespaces import reason
 
@@ -43,6 +43,11 @@ def test_many_are_killed(tmp_path: Path) -> None:
     for seed in range(10):
         (tmp_path / str(seed)).mkdir()
         killed(tmp_path / str(seed), Random(seed))
+
+
+@pytest.mark.parametrize("after", [0.0, 0.2, 0.35, 0.5, 0.8])
+def test_one_that_comes_back_is_killed_on_the_way(after: float, tmp_path: Path) -> None:
+    hit_twice(tmp_path, after)
 
 
 def test_a_flow_comes_back(tmp_path: Path) -> None:

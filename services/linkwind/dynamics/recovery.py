@@ -127,6 +127,7 @@ class Recovery:
         name, now = loss.provider, time.monotonic()
         known, last = self._session.participants[name], self._attempts.get(name)
         if name in self._absent and not known.instance:
+            known.here = False
             return  # the same one: its lease was over, it was on the bus again for a moment, and has ended
         answer = known.payload
         attempts = last[1] + 1 if last and last[0] == answer else 1

@@ -35,7 +35,7 @@ class Participant:
     checkpoints: int = 0  # taken so far
     saved: int = 0  # sent, as Bye says
     losses: int = 0
-    here: bool = False  # whether a process of it is on the bus
+    here: bool = False  # whether a process of it came on the bus, and its loss has not been told
     past: Past | None = None  # what it needs to come back; None if it never can
 
     @property
@@ -197,7 +197,7 @@ class HandShake:
         return body
 
     def seen(self, name: str, present: bool) -> None:
-        """Take note that a process of a provider is on the bus, or is not any more."""
+        """Take note that a process of a provider is on the bus, or is gone without having taken part."""
         if name in self.participants:
             self.participants[name].here = present
 
@@ -213,7 +213,7 @@ class HandShake:
         if known.payload and (known.past is None or known.past.torn):
             why = "sent no checkpoint when one was due" if known.rollback else "cannot save its memory"
             raise LostError(f'"{name}" cannot come back (bus.recovery): it {why}')
-        known.ready, known.instance = False, ""
+        known.ready, known.here, known.instance = False, False, ""
         known.losses += 1
 
     def _on_ready(self, message: Any) -> Any:

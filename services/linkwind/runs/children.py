@@ -78,7 +78,7 @@ class Children:
         for name, child in self._children.items():
             status, known = child.process.poll(), self._session.participants[name]
             if self._session.course.recovery:
-                # One that is on the bus, and has ended, is about to be seen lost.
+                # Of one that was on the bus, and has ended, the loss is about to be told.
                 ended = known.losses > child.losses or (status and not known.here)
                 if not ended or child.again(known.losses, known.payload):
                     continue

@@ -103,8 +103,9 @@ class ZenohDynamicsLink(Endpoint):
             query.reply(f"{PREFIX}/{self._exchanging.run}/refusal", self._exchanging.refusal())
 
     def _seen(self, name: str, present: bool) -> None:
-        self._exchanging.seen(name, present)
-        if not present and name in self._exchanging.taking_part:
+        if present or name not in self._exchanging.taking_part:
+            self._exchanging.seen(name, present)
+        else:
             self._fail(
                 LostError(
                     f'"{name}" was lost at {self._exchanging.where()}: its process ended, was stopped for '
