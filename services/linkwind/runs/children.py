@@ -79,7 +79,7 @@ class Children:
             status, known = child.process.poll(), self._session.participants[name]
             if self._session.course.recovery:
                 # Of one that was on the bus, and has ended, the loss is about to be told.
-                ended = known.losses > child.losses or (status and not known.here)
+                ended = known.losses > child.losses or (status and not known.here and not known.bye)
                 if not ended or child.again(known.losses, known.payload):
                     continue
             elif not status:
