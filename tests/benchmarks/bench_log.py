@@ -14,14 +14,14 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 from linkwind.log.reader import open_log
-from linkwind.log.state import StateEncoder
+from linkwind.log.state import StateMessage
 from linkwind.log.writer import CHUNK_SIZE, LogWriter
 from linkwind.runs.run import run
 from linkwind.scenario import load
 from linkwind.schema import MESSAGES
 from linkwind.spatial import Motion
 from linkwind.wire import FixedLayout
-from tests.log.sample import NQ, NV, N, motion_step, new_writer, record, state
+from tests.log.sample import NQ, NV, N, encoded, motion_step, new_writer, record, state
 
 MESSAGE_COUNT = 20_000
 STEPS = 3_000
@@ -103,8 +103,7 @@ def encoding_rows():
     point = state(np.random.default_rng(0))
     message = motion_step(1, point.motion)
     layout, data = FixedLayout(message), message.SerializeToString()
-    encode = StateEncoder(N, NQ, NV).encode
-    ours = repeat(encode, 1, 2, point.motion, **point.arrays, **point.scalars)
+    ours = repeat(encoded, StateMessage(N, NQ, NV), 1, 2, point)
     return [
         row("State, 3 bodies", "encode_us", ours, repeat(generic_state, point), 1.0),
         row(

@@ -99,12 +99,14 @@ def test_map_prints_the_table_and_writes_it(tmp_path):
 
 
 def test_map_of_what_is_not_understood_still_prints(tmp_path):
-    variables = (Variable("knob", "input"), Variable("Fx", "output"))
+    knobs = tuple(Variable(f"knob{i}", "input") for i in range(9))
+    variables = (Variable("knob", "input"), *knobs, Variable("Fx", "output"))
     file = fmu(tmp_path, Foreign(variables, code="#define OUTPUTS(m)"))
     result = CliRunner().invoke(app, ["fmu", "map", str(file), "two_link"])
     assert "NOT MAPPED" in result.output
     assert isinstance(result.exception, InputError)
     assert "input knob" in str(result.exception)
+    assert str(result.exception).splitlines()[-1].endswith(": and 4 more")
 
 
 def test_files_and_scenarios_that_do_not_fit(tmp_path):

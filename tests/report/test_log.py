@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from linkwind.errors import LogError
-from linkwind.log.state import StateEncoder, StepEncoder, TimingEncoder
+from linkwind.log.state import StateMessage, StepEncoder, TimingEncoder
 from linkwind.log.writer import LogWriter
 from linkwind.report import page as page_module
 from linkwind.report import write_report
 from linkwind.report.data import read
-from linkwind.spatial import Motion
 
 from .synthetic import planar
 
@@ -25,9 +24,8 @@ def run():
 def write_log(path, run, *, states, end):
     """Write the first states of a run; ``end`` closes the log."""
     track = run.trajectory
-    names = ["kinetic_energy", "potential_energy", "external_work", "dissipated_work", "joint_gap"]
-    names += ["q", "v", "acceleration", "reaction", "wrench"]
-    state, step, timing = StateEncoder(2, 4, 4), StepEncoder(3), TimingEncoder()
+    scalars = ["kinetic_energy", "potential_energy", "external_work", "dissipated_work", "joint_gap"]
+    state, step, timing = StateMessage(2, 4, 4), StepEncoder(3), TimingEncoder()
     log = LogWriter(
         path,
         run="r1",
@@ -38,9 +36,11 @@ def write_log(path, run, *, states, end):
     )
     for k in range(states):
         ns = k * 1_000_000
-        poses = (track.position, track.orientation, track.linear, track.angular)
-        motion = Motion(*(np.ascontiguousarray(part[k]) for part in poses))
-        log.state(state.encode(k, ns, motion, **{name: getattr(track, name)[k] for name in names}), ns)
+        for name in ("position", "orientation", "linear", "angular"):
+            getattr(state.motion, name)[...] = getattr(track, name)[k]
+        for name in ("q", "v", "acceleration", "reaction", "wrench"):
+            state.fields[name][...] = getattr(track, name)[k].ravel()
+        log.state(state.encode(k, ns, **{name: getattr(track, name)[k] for name in scalars}), ns)
         coupling = {
             "iteration": 0,
             "order": int(run.order[k]),

@@ -121,6 +121,16 @@ def test_curves_are_the_trajectory(run, page):
     assert all(re.search(r" \[.+\]$", label) for label in rows), "a unit on every axis"
 
 
+def test_a_component_of_round_off_alone_is_drawn_as_zero(run):
+    path = run.trajectory
+    linear = path.linear.copy()
+    linear[:, :, 0] = 1e-15
+    noisy = run_of(run.scenario, path._replace(linear=linear), np.ones((len(path.t), 4)))
+    rows = rows_of(Page(render(noisy)).data)
+    assert not unpack(rows["V<sub>x</sub> [m/s]"]["curves"][0]["y"]).any()
+    assert unpack(rows["V<sub>y</sub> [m/s]"]["curves"][0]["y"]).any()
+
+
 def test_the_energy_balance_of_an_exact_solution_closes(run):
     path = run.trajectory
     assert np.ptp(path.kinetic_energy) > 10.0

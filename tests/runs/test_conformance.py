@@ -47,8 +47,11 @@ def test_the_example_passes(tmp_path: Path) -> None:
     """From the command line, where it stands for a provider in any language."""
     linkwind = [sys.executable, "-m", "linkwind", "conformance", "two_link", "--json"]
     command = [*linkwind, "--", sys.executable, str(EXAMPLE), "{endpoint}"]
+    before = tmp_path / "conformance.log"
+    before.write_text("of the test before")
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=120, check=False)
     assert done.returncode == 0, done.stderr
+    assert "of the test before" not in before.read_text()
     checks = json.loads(done.stdout)["checks"]
     assert [check["check"] for check in checks] == list(CHECKS)
     assert all(check["ok"] for check in checks), checks

@@ -317,6 +317,12 @@ def test_command(log: Path, tmp_path: Path) -> None:
     assert done.exit_code == 5
     assert "/motion: trial.linear[4] of link2" in done.stdout
     assert "1 ULP" in done.stdout
+    assert "--from-recorded-wrenches" not in done.stdout
+    flip = lambda t, n, p: changed(t, p, "force", 0) if (t, n) == ("/wrench/aero", 6) else p  # noqa: E731
+    foreign = rewrite(log, tmp_path / "foreign.mcap", flip)
+    done = runner.invoke(app, ["verify", str(foreign)])
+    assert done.exit_code == 5
+    assert "if that provider was one of yours, take its forces as recorded" in done.stdout
 
 
 def test_a_run_with_a_force_fmu_needs_its_file(tmp_path: Path) -> None:

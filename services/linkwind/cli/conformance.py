@@ -27,9 +27,13 @@ def conformance(
     ],
     name: Annotated[str, typer.Option(help="Of the provider, as in the scenario.")] = "aero",
     set_: SetOption = None,
-    output: Annotated[Path, typer.Option("--output", help="File for what the provider prints, new.")] = Path(
-        "conformance.log"
-    ),
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            help="New file for what the provider prints; conformance.log, written anew, if not given.",
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Test whether a provider of yours keeps to the protocol; exit code 4 if it does not.
@@ -48,9 +52,12 @@ def conformance(
     from linkwind.runs.conformance import conformance as test
     from linkwind.scenario import load
 
-    if output.exists():
+    if output is not None and output.exists():
         raise InputError(f"{output}: expected a new file; got one that exists. Name another with --output.")
     loaded = load(scenario, set_ or [])
+    printed = output or Path("conformance.log")
+    if output is None:
+        printed.unlink(missing_ok=True)
     logging.getLogger("linkwind").setLevel(logging.ERROR)  # that it is killed, and comes back, is meant
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=len(CHECKS))
@@ -58,7 +65,7 @@ def conformance(
         def progress(check: str) -> None:
             bar.update(task, completed=list(CHECKS).index(check), description=check)
 
-        results = test(loaded, name, command, output, progress)
+        results = test(loaded, name, command, printed, progress)
     if as_json:
         typer.echo(json.dumps({"checks": [vars(result) for result in results]}))
     else:
@@ -68,5 +75,5 @@ def conformance(
             if result.saw:
                 typer.echo(f"        {result.saw}")
     if any(result.ok is False for result in results):
-        typer.echo(f"what it printed: {output}", err=True)
+        typer.echo(f"what it printed: {printed}", err=True)
         raise typer.Exit(4)

@@ -26,6 +26,7 @@ def fmu_map(
     """
     from linkwind.aero.fmu import survey
     from linkwind.errors import InputError
+    from linkwind.fmi.host.mapping import refusal
     from linkwind.scenario import load
 
     loaded = load(scenario, set_ or [])
@@ -42,4 +43,4 @@ def fmu_map(
             raise InputError(f"{out}: cannot be written: {error.strerror}. Choose another place.") from None
         print(f"wrote {out}: the table to start from, for the scenario", file=sys.stderr)
     if problems:
-        raise InputError("\n".join(problems))
+        raise refusal(problems, file)

@@ -78,6 +78,8 @@ def _behind_a_bar(name: str, steps: int, job: Callable[[Callable[[int], None]], 
 
 
 def _show(log: Log, steps: int, found: Verified) -> None:
+    from linkwind.log.contents import WRENCH
+
     if found.difference is not None:
         typer.echo("different: the first difference is")
         rows(found.difference.lines("recorded", "again"))
@@ -86,6 +88,10 @@ def _show(log: Log, steps: int, found: Verified) -> None:
             rows((name, f"{then} -> {now}") for name, (then, now) in found.changed.items())
         else:
             typer.echo("versions, processor and library are those that made the log")
+        if found.difference.topic.startswith(WRENCH):
+            typer.echo(
+                "if that provider was one of yours, take its forces as recorded: --from-recorded-wrenches"
+            )
     else:
         extent = f"{found.steps} of {steps} steps, {found.messages} messages"
         typer.echo(f"identical: {extent}, every bit of them")

@@ -13,6 +13,7 @@ from linkwind.report.data import Diagnostics, Run, largest
 from linkwind.spatial import Array
 
 POINTS = 2000  # of a curve
+ROUND_OFF = 1e-12  # of a vector's usual size: a component that is always below is drawn as zero
 MANY_BODIES = 8  # more of them share the points of this many
 
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
@@ -60,10 +61,25 @@ def _curve(run: Run, name: str, colour: int, y: Array, t: Array | None = None) -
 
 def _body_rows(run: Run, labels: Sequence[str], columns: Array) -> list[dict[str, Any]]:
     """Return a row for each component of ``columns``, shape (k, n, components), a curve for each body."""
+    drawn = _above_round_off(columns)
     return [
-        _row(label, *(_curve(run, name, i, columns[:, i, c]) for i, name in enumerate(run.bodies)))
+        _row(label, *(_curve(run, name, i, drawn[:, i, c]) for i, name in enumerate(run.bodies)))
         for c, label in enumerate(labels)
     ]
+
+
+def _above_round_off(values: Array) -> Array:
+    """Return values with zeros for a component that is never more than noise, which would fill its plot.
+
+    Args:
+        values: of vectors, shape (k, n, components).
+    """
+    if not values.size:
+        return values
+    finite = np.isfinite(values)
+    size = np.where(finite, np.abs(values), 0.0)
+    noise = size.max(axis=(0, 1)) < ROUND_OFF * np.median(size.max(axis=(1, 2)))
+    return np.where(noise & finite, 0.0, values)
 
 
 def _labels(symbol: str, axes: Sequence[int], unit: str) -> list[str]:
@@ -99,8 +115,9 @@ def _joints(run: Run) -> dict[str, Any] | None:
     if not forces:
         return None
     axes = _MOTION_AXES[run.planar]
+    drawn = _above_round_off(np.stack([force[:, :3] for _, _, force in forces], axis=1))
     rows = [
-        _row(label, *(_curve(run, name, i, force[:, axis]) for i, name, force in forces))
+        _row(label, *(_curve(run, name, i, drawn[:, j, axis]) for j, (i, name, _) in enumerate(forces)))
         for axis, label in zip(axes, _labels("R", axes, "N"), strict=True)
     ]
     rows += _gap(run)
@@ -170,8 +187,13 @@ def _exchange(run: Run) -> dict[str, Any] | None:
         "y": pack(counts),
     }
     row = _row("exchanges [1]", bars, bars=True, xlabel="wall time of an exchange [µs]")
-    shares = ", ".join(f"{name} {np.percentile(times, q):.4g} µs" for name, q in _PERCENTILES.items())
+    shares = ", ".join(f"{name} {_short(np.percentile(times, q))}" for name, q in _PERCENTILES.items())
     return _panel("Exchange time", [row], f"From putting the motion to having every wrench: {shares}.")
+
+
+def _short(microseconds: float) -> str:
+    factor, unit = prefixed(microseconds * 1e-6, "s")
+    return f"{microseconds * 1e-6 * factor:.3g} {unit}"
 
 
 _PERCENTILES = {"median": 50, "90 %": 90, "99 %": 99, "largest": 100}

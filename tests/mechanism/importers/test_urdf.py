@@ -196,6 +196,7 @@ def test_links_without_mass_are_merged_or_left_out(tmp_path):
     assert (bodies["bob"].mass, bodies["bob"].inertia) == (2.0, (0.0,) * 6)  # a point mass may be one
     assert [joint.parent for joint in got.scenario.joints if joint.name == "x"] == ["arm"]
     left = {(remark.what, remark.item) for remark in got.remarks}
+    assert ("links with mass and without inertia", "bob") in left
     assert ("links without mass at the end of the tree, with their joints", "wheel (w)") in left
     merged = "links merged into the one that they are fixed to"
     assert {(merged, "base → world"), (merged, "tool → arm")} < left

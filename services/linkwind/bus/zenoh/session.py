@@ -160,8 +160,13 @@ def _limit(message: str, key: str, size: int) -> dict[str, Any]:
 
 
 def _check_kind(endpoints: Sequence[str], security: Security | None) -> None:
-    """Raise InputError unless all endpoints are of TLS, or none is."""
+    """Raise InputError unless all are endpoints, and all of TLS or none."""
     for endpoint in endpoints:
+        if not re.fullmatch(r"\w+/\S+", endpoint):
+            raise InputError(
+                f'"{endpoint}": expected an endpoint, such as tcp/127.0.0.1:7447; got no protocol with an '
+                f"address. Did you mean tcp/{endpoint or '127.0.0.1:7447'}?"
+            )
         if endpoint.startswith("tls/") != (security is not None):
             expected = "an endpoint with TLS, such as tls/10.0.0.2:7447, because of --tls"
             if security is None:

@@ -38,9 +38,14 @@ def resolve(fmu: Description, settings: FmuModel, bodies: Sequence[str]) -> Mapp
     """
     mapping, problems = survey(fmu, settings, bodies)
     if problems:
-        more = len(problems) - SHOWN
-        raise InputError("\n".join(problems[:SHOWN] + [f"{fmu.path}: and {more} more"] * (more > 0)))
+        raise refusal(problems, fmu.path)
     return mapping
+
+
+def refusal(problems: Sequence[str], path: object) -> InputError:
+    """Return the error for what is wrong with the mapping of the FMU at a path, the first few of it."""
+    more = len(problems) - SHOWN
+    return InputError("\n".join([*problems[:SHOWN], *[f"{path}: and {more} more"] * (more > 0)]))
 
 
 def survey(fmu: Description, settings: FmuModel, bodies: Sequence[str]) -> tuple[Mapping, list[str]]:

@@ -231,6 +231,11 @@ def _note_left_out(model: Model, root: Element) -> None:
         _note_of_joint(model, joint)
     touching = [link.text("name") for link in root.all("link") if link.first("collision")]
     model.leave_out("collision shapes", "bodies do not touch", touching)
+    heavy = [
+        link for link in root.all("link") if (own := link.first("inertial")) and not own.first("inertia")
+    ]
+    points = [link.text("name") for link in heavy]
+    model.leave_out("links with mass and without inertia", "each is a point, as the file has it", points)
 
 
 def _note_of_joint(model: Model, joint: Element) -> None:
