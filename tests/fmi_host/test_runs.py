@@ -109,6 +109,13 @@ def test_map_of_what_is_not_understood_still_prints(tmp_path):
     assert str(result.exception).splitlines()[-1].endswith(": and 4 more")
 
 
+def test_the_fmu_of_a_mechanism_is_no_force_model(tmp_path):
+    file = tmp_path / "two_link.fmu"
+    assert CliRunner().invoke(app, ["fmu", "export", "two_link", "-o", str(file)]).exit_code == 0
+    with pytest.raises(InputError, match=r"link1\.F\[1\].*the FMU of a mechanism\. .*--part aero\.$"):
+        load_with("two_link", [], [str(file)])
+
+
 def test_files_and_scenarios_that_do_not_fit(tmp_path):
     file = fmu(tmp_path, DRAG)
     with pytest.raises(InputError, match=r"expected the FMU with SHA-256 0{64}; got [0-9a-f]{64}"):

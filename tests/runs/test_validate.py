@@ -5,7 +5,10 @@ import math
 
 import pytest
 from scipy.special import ellipj, ellipk
+from typer.testing import CliRunner
 
+from linkwind.cli import app
+from linkwind.errors import InputError
 from linkwind.runs.validate import COUPLING, MULTIBODY, page
 from linkwind.runs.validate.multibody import elliptic
 from linkwind.runs.validate.rows import Findings, Row, most, near
@@ -33,6 +36,14 @@ def test_rows_judge_and_are_plain(tmp_path):
     assert "off" in text
     assert "a remark" in text
     assert "3 ok, 2 off" in text
+
+
+def test_a_folder_that_cannot_be_is_told_before_the_cases(tmp_path):
+    (tmp_path / "file").touch()
+    for command in (["validate", "flow"], ["reproduce"]):
+        done = CliRunner().invoke(app, [*command, "--out", str(tmp_path / "file" / "out")])
+        assert isinstance(done.exception, InputError)
+        assert "Choose another --out" in str(done.exception)
 
 
 @pytest.mark.parametrize("m", [0.0, 0.3, 0.99])

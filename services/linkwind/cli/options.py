@@ -22,7 +22,8 @@ LogArgument = Annotated[
     Path, typer.Argument(help="The MCAP log of a run, or the run's folder.", callback=log_in)
 ]
 OutOption = Annotated[
-    Path | None, typer.Option("--out", help="Folder for the results; a new one under runs/ if not given.")
+    Path | None,
+    typer.Option("--out", "-o", help="Folder for the results; a new one under runs/ if not given."),
 ]
 SetOption = Annotated[
     list[str] | None,

@@ -18,7 +18,7 @@ def register(app: typer.Typer) -> None:
 def report(
     log: LogArgument,
     out: Annotated[
-        Path | None, typer.Option("--out", help="The page; report.html beside the log if not given.")
+        Path | None, typer.Option("--out", "-o", help="The page; report.html beside the log if not given.")
     ] = None,
 ) -> None:
     """Write the HTML report of a log.

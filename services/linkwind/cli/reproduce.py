@@ -20,9 +20,9 @@ def register(app: typer.Typer) -> None:
 
 
 def reproduce(
-    out: Annotated[Path, typer.Option("--out", help="New folder for the page, logs and reports.")] = Path(
-        "paper"
-    ),
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="New folder for the page, logs and reports.")
+    ] = Path("paper"),
     short: Annotated[bool, typer.Option("--short", help="A coarser flow: half the time.")] = False,
     as_json: JsonOption = False,
 ) -> None:

@@ -32,7 +32,7 @@ def flow(
     short: Annotated[bool, typer.Option("--short", help="A coarser form, some 2 minutes.")] = False,
     case: CaseOption = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for flow.html: the table and plots.")
+        Path | None, typer.Option("--out", "-o", help="Folder for flow.html: the table and plots.")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -51,7 +51,7 @@ def multibody(
     short: Annotated[bool, typer.Option("--short", help="Shorter and fewer, some 10 s.")] = False,
     case: CaseOption = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for multibody.html: the table and plots.")
+        Path | None, typer.Option("--out", "-o", help="Folder for multibody.html: the table and plots.")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -70,7 +70,7 @@ def coupling(
     short: Annotated[bool, typer.Option("--short", help="Fewer and coarser, a second.")] = False,
     case: CaseOption = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for coupling.html: the table and plots.")
+        Path | None, typer.Option("--out", "-o", help="Folder for coupling.html: the table and plots.")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -91,6 +91,8 @@ def _validate(
             raise InputError(
                 f'--case: expected one of {", ".join(suite.cases)}; got "{case}". Use one of these names.'
             )
+    if out is not None:
+        _make(out)  # rather than fail after minutes
     rows, plots = _run(suite, short, chosen)
     if out is not None:
         from linkwind.runs.validate import page
@@ -105,6 +107,13 @@ def _validate(
             typer.echo(str(out / f"{name}.html"))
     if any(row.ok is False for row in rows):
         raise typer.Exit(DIFFERENT)
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be a folder: {error.strerror}. Choose another --out.") from None
 
 
 def _run(suite: Suite, short: bool, chosen: tuple[str, ...]) -> tuple[list[Row], list[Plot]]:

@@ -31,6 +31,16 @@ def unmapped(variable: Variable, element: str) -> Problem:
     )
 
 
+def mechanism(forces: Sequence[str]) -> Problem:
+    """Say what to do about an FMU that takes forces, as that of a mechanism does."""
+    return (
+        f"inputs {', '.join(forces[:4])}",
+        "the motion of bodies, because a force model takes motion and gives forces",
+        "forces, so that this is the FMU of a mechanism",
+        "Give that of a force model, such as: linkwind fmu export SCENARIO --part aero.",
+    )
+
+
 def twice(outputs: Sequence[Link]) -> Iterator[Problem]:
     """Find outputs that are the same quantity of the same body."""
     first: dict[tuple[str, int, int], Link] = {}

@@ -77,7 +77,10 @@ class _Resolver:
         self._angular(inputs)
         per_body = self._per_body([*inputs.links, *outputs.links])
         sides = [self._bodies_of(side, per_body) for side in (inputs, outputs)]
-        for variable, element in inputs.left:
+        forces = [element for variable, element in inputs.left if self._is_force(variable, element)]
+        if forces:
+            self._problem(*checks.mechanism(forces))
+        for variable, element in [] if forces else inputs.left:
             self._problem(*checks.unmapped(variable, element))
         for problem in checks.twice(sides[1]):
             self._problem(*problem)
@@ -97,6 +100,10 @@ class _Resolver:
             unmapped=tuple(element for _, element in inputs.left),
             ignored=tuple(element for _, element in outputs.left),
         )
+
+    def _is_force(self, variable: Variable, element: str) -> bool:
+        found = read(element, "output", self._bodies, scalar=element == variable.name)
+        return found is not None and found.quantity == "force"
 
     def _problem(self, item: str, expected: str, got: str, advice: str) -> None:
         self.problems.append(f"{self._fmu.path}: {item}: expected {expected}; got {got}. {advice}")

@@ -62,7 +62,10 @@ def reproduce(out: Path, progress: Progress = lambda job, done: None, *, short: 
     """
     if out.exists():
         raise InputError(f"{out}: expected a new folder; got one that exists. Name another with --out.")
-    out.mkdir(parents=True)
+    try:
+        out.mkdir(parents=True)
+    except OSError as error:
+        raise InputError(f"{out}: cannot be a folder: {error.strerror}. Choose another --out.") from None
     field, two_programs, hinged_flow, free_flow, last = JOBS
     progress(field, 0.0)
     velocities = [accuracy.velocities(name, out) for name in ("two_link_field", "two_link_gust")]

@@ -4,6 +4,7 @@ import { bodyColour, theme } from "/report/charts.js";
 import { add, length, nice, number, turned } from "/report/motion.js";
 
 const SIDES = 10; // of the head of an arrow
+const ARROW = 0.18; // of the room's side, the longest arrow: it stays in the room wherever it begins
 const FRAME = 30; // ms between two pictures at least
 
 // Triangles over closed lines of a body: caps, and sides between the two faces of an outline.
@@ -60,12 +61,12 @@ export function makeSpace(host, motion, clock) {
   function room(now) {
     const { low, high, reach } = motion.world;
     const middle = follow.checked ? motion.centre(now) : low.map((x, k) => (x + high[k]) / 2);
-    const half = follow.checked ? 1.6 * reach : 0.55 * Math.max(...high.map((x, k) => x - low[k]), 1e-9);
+    const half = follow.checked ? 1.6 * reach : 0.8 * Math.max(...high.map((x, k) => x - low[k]), 1e-9);
     return middle.map((x) => [x - half, x + half]);
   }
 
   function arrows(now, metres) {
-    const lines = [], heads = [], scale = motion.largest ? (0.35 * metres) / motion.largest : 0;
+    const lines = [], heads = [], scale = motion.largest ? (ARROW * metres) / motion.largest : 0;
     for (const { at, force } of now) {
       const size = length(force) * scale;
       if (!(size > 0.002 * metres)) { heads.push(...Array(SIDES + 1).fill(at)); continue; }
