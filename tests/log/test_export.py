@@ -14,6 +14,10 @@ from linkwind.errors import InputError, LogError
 from linkwind.log import export
 from linkwind.log.reader import open_log
 from linkwind.log.vtk import export_vtk
+from linkwind.mechanism import build
+from linkwind.mechanism.labels import labels
+from linkwind.runs.run import run
+from linkwind.scenario import builtin_names, load
 from tests.log.sample import NAMES, new_writer, record
 
 POINTS = 20
@@ -101,3 +105,24 @@ def test_command_says_what_is_missing(tmp_path):
     assert "note: the log is not complete" in done.stderr
     rows = read(tmp_path / "t" / "trajectory.csv")["step"]
     assert 0 < len(rows) == open_log(tmp_path / "cut.mcap").topics["/state"] < 20
+
+
+def test_coordinates_and_forces_have_the_names_of_the_scenario(tmp_path):
+    """The wings of the flapper beat as its motions say."""
+    short = ["time.end=0.02", "bus.transport=inprocess"]
+    log = run(load("flapper", short), tmp_path / "run", lambda step: None).log
+    done = CliRunner().invoke(app, ["log", "export", str(log), "-o", str(tmp_path / "t")])
+    assert done.exit_code == 0, done.output
+    found = read(tmp_path / "t" / "trajectory.csv")
+    t = found["t [s]"]
+    np.testing.assert_allclose(found["right_shoulder.q"], -0.6 * np.sin(12.0 * np.pi * t), atol=1e-12)
+    np.testing.assert_allclose(found["left_shoulder.v"], 7.2 * np.pi * np.cos(12.0 * np.pi * t), atol=1e-9)
+    assert {"left_beat.force_effort", "right_beat.force_power", "world-body.q.6"} < set(found)
+
+
+@pytest.mark.parametrize("name", builtin_names())
+def test_every_coordinate_of_every_built_in_scenario_has_a_name(name):
+    mechanism = build(load(name))
+    names = labels(mechanism)
+    assert len(set(names["q"])) == len(mechanism.q0)
+    assert len(set(names["v"])) == len(mechanism.v0)

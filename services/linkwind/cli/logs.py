@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from linkwind.cli.options import JsonOption, LogArgument
+
+if TYPE_CHECKING:
+    from linkwind.log.reader import Log
 
 
 class Format(StrEnum):
@@ -94,11 +97,26 @@ def export(
     from linkwind.log.reader import open_log
     from linkwind.log.vtk import export_vtk
 
-    kinds = {Format.CSV: export_csv, Format.PARQUET: export_parquet, Format.VTK: export_vtk}
-
     opened = open_log(log)
     if not opened.complete:
         reason = opened.damage.text if opened.damage else opened.error
         typer.echo(f"note: the log is not complete: {reason or 'the run was cut off'}", err=True)
-    for path in kinds[format_](opened, out):
+    if format_ == Format.VTK:
+        paths = export_vtk(opened, out)
+    else:
+        paths = (export_csv if format_ == Format.CSV else export_parquet)(opened, out, _names(opened))
+    for path in paths:
         typer.echo(f"wrote {path}")
+
+
+def _names(log: Log) -> dict[str, tuple[str, ...]]:
+    """Return what numbers of joints, events and force elements are called; nothing if no scenario tells."""
+    from linkwind.errors import InputError
+    from linkwind.mechanism import build
+    from linkwind.mechanism.labels import labels
+    from linkwind.scenario import from_json
+
+    try:
+        return labels(build(from_json(log.scenario_json)))
+    except InputError:
+        return {}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,6 +14,9 @@ from linkwind.errors import InputError, LogError
 from linkwind.log import contents, tables
 from linkwind.log.difference import WIDTHS
 from linkwind.log.reader import Log
+
+Names = Mapping[str, Sequence[str]]
+"""What the numbers of a field are called, by field, where they belong to no body."""
 
 BLOCK = 4096  # messages in memory at a time
 
@@ -41,7 +44,7 @@ class Block(NamedTuple):
     columns: list[NDArray[Any]]
 
 
-def export_csv(log: Log, folder: Path) -> list[Path]:
+def export_csv(log: Log, folder: Path, names: Names | None = None) -> list[Path]:
     """Write ``trajectory.csv``, ``steps.csv`` and ``wrench_PROVIDER.csv``; see :func:`_export`."""
 
     def write(path: Path, blocks: Iterator[Block]) -> None:
@@ -52,10 +55,10 @@ def export_csv(log: Log, folder: Path) -> list[Path]:
                     writer.writerow(head)
                 writer.writerows(zip(*(column.tolist() for column in columns), strict=True))
 
-    return _export(log, folder, "csv", write)
+    return _export(log, folder, names or {}, "csv", write)
 
 
-def export_parquet(log: Log, folder: Path) -> list[Path]:
+def export_parquet(log: Log, folder: Path, names: Names | None = None) -> list[Path]:
     """Write ``trajectory.parquet``, ``steps.parquet`` and ``wrench_PROVIDER.parquet``; see :func:`_export`.
 
     Raises:
@@ -77,17 +80,18 @@ def export_parquet(log: Log, folder: Path) -> list[Path]:
             for table in (first, *tables_):
                 writer.write_table(table)
 
-    return _export(log, folder, "parquet", write)
+    return _export(log, folder, names or {}, "parquet", write)
 
 
 def _export(
-    log: Log, folder: Path, suffix: str, write: Callable[[Path, Iterator[Block]], None]
+    log: Log, folder: Path, names: Names, suffix: str, write: Callable[[Path, Iterator[Block]], None]
 ) -> list[Path]:
     """Write trajectory, steps and wrenches of what can be read.
 
     Args:
         log: to read.
         folder: for the files; is made if it is not there.
+        names: of numbers of the trajectory; those without are numbered.
         suffix: of the files.
         write: writes one of them.
 
@@ -98,14 +102,14 @@ def _export(
         LogError: a file exists or cannot be written, or the log has no messages.
     """
     wrenches = {f"{contents.WRENCH}{name}": f"wrench_{name}" for name in log.provider_bodies}
-    names = {contents.STATE: "trajectory", contents.STEP: "steps"} | wrenches
+    files = {contents.STATE: "trajectory", contents.STEP: "steps"} | wrenches
     written = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for topic, name in names.items():
+        for topic, name in files.items():
             if log.topics.get(topic):
                 path = folder / f"{name}.{suffix}"
-                write(path, _blocks(log, topic))
+                write(path, _blocks(log, topic, names))
                 written.append(path)
     except OSError as error:
         raise LogError(
@@ -116,7 +120,7 @@ def _export(
     return written
 
 
-def _blocks(log: Log, topic: str) -> Iterator[Block]:
+def _blocks(log: Log, topic: str, names: Names) -> Iterator[Block]:
     """Yield the messages of a topic, so many at a time."""
     name = str(contents.message_name(topic))
     provider = topic.removeprefix(contents.WRENCH)
@@ -125,25 +129,26 @@ def _blocks(log: Log, topic: str) -> Iterator[Block]:
     while block := list(islice(payloads, BLOCK)):
         columns = tables.columns(block, name, f"{log.path}: {topic}")
         t = tables.seconds(columns.pop("time_ns"))
-        labels = (_labels(field, values, bodies, numbers) for field, values in columns.items())
+        known = dict(names) | {"diagnostics": numbers}
+        labels = (_labels(field, values, bodies, known) for field, values in columns.items())
         head = [label for field in labels for label in field]
         step, *others = columns.values()
         values = [column for field in (step, t, *others) for column in field.T]
         yield Block([head[0], "t [s]", *head[1:]], values)
 
 
-def _labels(field: str, values: NDArray[Any], bodies: Sequence[str], numbers: Sequence[str]) -> Iterator[str]:
+def _labels(field: str, values: NDArray[Any], bodies: Sequence[str], names: Names) -> Iterator[str]:
     """Yield the title of each column of a field: body, quantity, component, unit.
 
     Args:
         field: of the message, dotted.
         values: its columns.
         bodies: of the message.
-        numbers: names of the provider's own.
+        names: of numbers, by field.
     """
     leaf, width = field.rsplit(".", 1)[-1], values.shape[1]
-    if leaf == "diagnostics" and len(numbers) == width:
-        yield from numbers
+    if len(names.get(leaf, ())) == width > 0:
+        yield from names[leaf]
         return
     per_body = leaf in WIDTHS and width == WIDTHS[leaf] * len(bodies)
     for place in range(width):
