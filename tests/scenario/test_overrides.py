@@ -71,6 +71,9 @@ def test_aero_can_be_set_where_the_file_has_no_provider():
          'forces, providers, dynamics, coupling, bus, log, aero; got "cfd". Remove it.'),
         ("environment.wind.3=2",
          'environment.wind: expected an index from 0 to 2; got "3". Use one of these.'),
+        ("events.release.at=1",
+         'events: expected the index or name of an entry: (there is none); got "release". '
+         "Leave it out."),
         ("environment.gusts.0.frequency=1",
          'environment.gusts: expected the index or name of an entry: (there is none); got "0". '
          "Leave it out."),

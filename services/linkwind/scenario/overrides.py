@@ -11,6 +11,7 @@ from linkwind.scenario.problems import Path, Problem, ProblemError, choice, show
 TABLE_LISTS: tuple[Path, ...] = (
     ("bodies",),
     ("joints",),
+    ("events",),
     ("forces",),
     ("providers",),
     ("environment", "gusts"),
