@@ -1,6 +1,7 @@
 """What newcomers need not wait for: `pytest -m slow` runs it, and CI does."""
 
 import pytest
+from hypothesis import settings
 
 FLOWS = ("cylinder", "falling_plate", "two_link_flow_free", "vortex_induced_vibration")
 SLOW = (
@@ -40,6 +41,10 @@ SLOW = (
     *(f"tests/scenarios/test_runs.py::test_run_leaves_a_complete_log_and_a_report[{n}" for n in FLOWS),
     *(f"tests/scenarios/test_runs.py::test_transport_changes_no_bit[{n}" for n in FLOWS),
 )
+
+# How long an example takes says how busy the machine is, and nothing about the program.
+settings.register_profile("linkwind", deadline=None)
+settings.load_profile("linkwind")
 
 
 @pytest.hookimpl(tryfirst=True)
