@@ -12,8 +12,12 @@ from linkwind.log.writer import LogWriter
 from linkwind.report import page as page_module
 from linkwind.report import write_report
 from linkwind.report.data import read
+from linkwind.report.panels import panels
+from linkwind.runs.run import run as run_scenario
+from linkwind.scenario import loads
 
 from .synthetic import planar
+from .test_page import unpack
 
 
 @pytest.fixture
@@ -109,3 +113,50 @@ def test_not_a_log(tmp_path):
     with pytest.raises(LogError, match=r"log\.mcap"):
         write_report(path, tmp_path / "report.html")
     assert not (tmp_path / "report.html").exists()
+
+
+def test_angles_and_distances_of_joints_are_plotted_by_name(tmp_path):
+    """A slide on a hinge: what is drawn is what the joints are at, in degrees and metres."""
+    text = """
+[time]
+end = 0.2
+[[bodies]]
+name = "arm"
+mass = 1.0
+inertia = 0.1
+[[bodies]]
+name = "sledge"
+mass = 0.5
+inertia = 0.05
+[[joints]]
+name = "hinge"
+type = "revolute"
+parent = "world"
+child = "arm"
+child_point = [-0.5, 0.0]
+[[joints]]
+name = "slide"
+type = "prismatic"
+parent = "arm"
+child = "sledge"
+axis = [1.0, 0.0, 0.0]
+[aero]
+model = "none"
+[bus]
+transport = "inprocess"
+"""
+    outcome = run_scenario(loads(text, "slide.toml"), tmp_path / "out")
+    found = read(outcome.log)
+    assert [each.joint for each in found.coordinates] == ["hinge", "slide"]
+    (panel,) = [panel for panel in panels(found) if panel["title"] == "Joint coordinates"]
+    drawn = {row["label"]: (row["curves"][0]["name"], unpack(row["curves"][0]["y"])) for row in panel["rows"]}
+    path = found.trajectory
+    arm = 2.0 * np.arctan2(path.orientation[:, 0, 3], path.orientation[:, 0, 0])
+    along = np.stack([np.cos(arm), np.sin(arm)], axis=-1)
+    offset = ((path.position[:, 1, :2] - path.position[:, 0, :2]) * along).sum(axis=1)
+    assert drawn["angle [°]"][0] == "hinge"
+    np.testing.assert_allclose(drawn["angle [°]"][1], np.degrees(arm), rtol=1e-6)
+    assert drawn["distance [m]"][0] == "slide"
+    np.testing.assert_allclose(drawn["distance [m]"][1], offset, atol=1e-6)
+    np.testing.assert_allclose(drawn["rate [°/s]"][1], np.degrees(path.angular[:, 0, 2]), rtol=1e-6)
+    assert np.abs(np.diff(offset)).max() > 0.0

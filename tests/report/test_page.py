@@ -252,7 +252,7 @@ def test_a_run_in_three_dimensions_has_the_third_component():
 
 def test_without_joints_there_is_no_joint_panel():
     page = Page(render(planar(5, joints=[])))
-    assert "Joints" not in [panel["title"] for panel in page.data["panels"]]
+    assert "Joint forces" not in [panel["title"] for panel in page.data["panels"]]
 
 
 def test_a_long_run_is_thinned_but_keeps_its_peaks(run):

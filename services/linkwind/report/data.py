@@ -8,16 +8,20 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from linkwind.errors import LinkwindError
 from linkwind.log.contents import STATE, STEP, TIMING, WRENCH
 from linkwind.log.origin import origin
 from linkwind.log.reader import Log, open_log
 from linkwind.log.tables import Trajectory, seconds
+from linkwind.mechanism import build
+from linkwind.mechanism.labels import labels
 from linkwind.report.flow import Flow, survey
+from linkwind.scenario import from_json
 from linkwind.scenario.topology import carries
 from linkwind.spatial import Array
 
@@ -39,6 +43,24 @@ class Diagnostics:
     values: Array
 
 
+class Coordinate(NamedTuple):
+    """The coordinate of a joint that has one.
+
+    Attributes:
+        joint: its name.
+        body: index of the body that it carries.
+        turns: whether it is an angle [rad]; else a distance [m].
+        q: its place among the joint coordinates.
+        v: that of its rate among the joint velocities.
+    """
+
+    joint: str
+    body: int
+    turns: bool
+    q: int
+    v: int
+
+
 @dataclass(frozen=True)
 class Run:
     """One run, complete or not.
@@ -58,6 +80,7 @@ class Run:
         exchange: wall time of each exchange [s], shape (m,).
         flows: frames of the fluid, of each provider that showed any.
         diagnostics: numbers of each provider that reported any.
+        coordinates: of the joints that have one.
     """
 
     scenario: Mapping[str, Any]
@@ -73,6 +96,7 @@ class Run:
     flows: tuple[Flow, ...] = ()
     diagnostics: tuple[Diagnostics, ...] = ()
     origin: tuple[str, ...] = ()
+    coordinates: tuple[Coordinate, ...] = ()
 
     @property
     def steps(self) -> int:
@@ -183,6 +207,29 @@ def read(path: Path) -> Run:
         flows=tuple(filter(None, (survey(name, partial(log.frames, name)) for name in log.flows))),
         diagnostics=tuple(_diagnostics(log)),
         origin=tuple(origin(log)),
+        coordinates=coordinates(log.scenario_json),
+    )
+
+
+def coordinates(scenario_json: str) -> tuple[Coordinate, ...]:
+    """Return the coordinates of the joints of a scenario that have one, and keep it."""
+    try:
+        scenario = from_json(scenario_json)
+        mechanism = build(scenario)
+    except LinkwindError:  # it is of another version: the rest of the log can be shown all the same
+        return ()
+    q, v = (list(labels(mechanism)[field]) for field in ("q", "v"))
+    bodies = {joint: body for body, joint in enumerate(mechanism.joints)}
+    return tuple(
+        Coordinate(
+            joint.name,
+            bodies[joint.name],
+            joint.type == "revolute",
+            q.index(f"{joint.name}.q"),
+            v.index(f"{joint.name}.v"),
+        )
+        for joint in scenario.joints
+        if f"{joint.name}.q" in q
     )
 
 

@@ -28,7 +28,7 @@ def points_per_curve(run: Run) -> int:
 
 def panels(run: Run) -> list[dict[str, Any]]:
     """Return the plots of a run in reading order; those that have nothing to show are left out."""
-    every = (_velocity, _aerodynamic, _joints, _coupling, _energy, _exchange)
+    every = (_velocity, _aerodynamic, _coordinates, _joints, _coupling, _energy, _exchange)
     made = (panel(run) for panel in every)
     return [panel for panel in made if panel is not None] + [_reported(run, each) for each in run.diagnostics]
 
@@ -105,6 +105,27 @@ def _aerodynamic(run: Run) -> dict[str, Any]:
     return _panel("Aerodynamic force", rows, note)
 
 
+def _coordinates(run: Run) -> dict[str, Any] | None:
+    """Return angles and distances of joints that have one coordinate, and their rates."""
+    rows: list[dict[str, Any]] = []
+    for turns, unit, factor in ((True, "°", np.degrees(1.0)), (False, "m", 1.0)):
+        joints = [each for each in run.coordinates if each.turns == turns and len(run.trajectory.t)]
+        if not joints:
+            continue
+        symbol = "angle" if turns else "distance"
+        for values, label in (
+            (run.trajectory.q[:, [each.q for each in joints]], f"{symbol} [{unit}]"),
+            (run.trajectory.v[:, [each.v for each in joints]], f"rate [{unit}/s]"),
+        ):
+            curves = (_curve(run, j.joint, j.body, factor * values[:, i]) for i, j in enumerate(joints))
+            rows.append(_row(label, *curves))
+    return (
+        _panel("Joint coordinates", rows, "Zero where the frames of both bodies are parallel.")
+        if rows
+        else None
+    )
+
+
 def _joints(run: Run) -> dict[str, Any] | None:
     path, bodies = run.trajectory, len(run.bodies)
     forces = [(i, joint["name"], path.reaction[:, i]) for i, joint in enumerate(run.joint_of) if joint]
@@ -122,7 +143,7 @@ def _joints(run: Run) -> dict[str, Any] | None:
     ]
     rows += _gap(run)
     last = " Joints that close loops come last." if run.closures else ""
-    return _panel("Joints", rows, f"Force of the parent on the child, in its colour.{last}")
+    return _panel("Joint forces", rows, f"Force of the parent on the child, in its colour.{last}")
 
 
 def _energy(run: Run) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from linkwind.log import tables
 from linkwind.log.contents import STATE, STEP, WRENCH
 from linkwind.log.seek import SeekableLog, open_seekable
 from linkwind.report.arrays import pack
-from linkwind.report.data import Diagnostics, Run, no_trajectory
+from linkwind.report.data import Diagnostics, Run, coordinates, no_trajectory
 from linkwind.report.panels import panels
 from linkwind.report.scene import scene
 from linkwind.spatial import Array
@@ -76,6 +76,7 @@ class Recording:
         self.scenario: dict[str, Any] = json.loads(self.log.scenario_json)
         self.step_ns = round(float(self.scenario["coupling"]["step"]) * 1e9)
         self._stated_flat = all(isinstance(body["inertia"], float | int) for body in self.scenario["bodies"])
+        self._coordinates = coordinates(self.log.scenario_json)
         self._balance: float | None = None
 
     @cached_property
@@ -197,6 +198,7 @@ class Recording:
             extrapolation_error=np.empty((0, 0)),
             interface_energy=np.empty(0),
             exchange=np.empty(0),
+            coordinates=self._coordinates,
             flat=self.flat,
             balance=self._balance or 0.0,
         )
