@@ -171,7 +171,8 @@ def behind_a_bar(name: str, steps: int, job: Callable[[Progress], T]) -> T:
         outcome = job(progress)
         progress(steps)
     finally:
-        bar.stop()
+        if bar.live.is_started:  # else it would leave an empty line
+            bar.stop()
     return outcome
 
 
