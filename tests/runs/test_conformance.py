@@ -9,12 +9,11 @@ from pathlib import Path
 
 import pytest
 
-import linkwind
 from linkwind.errors import InputError
 from linkwind.runs.conformance import CHECKS, conformance
 from linkwind.scenario import load
 
-EXAMPLE = Path(linkwind.__file__).parents[2] / "schemas" / "examples" / "provider.py"
+EXAMPLE = Path(__file__).parents[2] / "schemas" / "examples" / "provider.py"
 OWN = [sys.executable, "-m", "linkwind", "aero", "--connect", "{endpoint}", "--name", "{name}"]
 
 # What is changed in the example, and the checks that must find it, alone.
