@@ -41,4 +41,5 @@ if [ -z "${BASE:-}" ]; then
     tests/docker/base.sh "$BASE"
 fi
 LINKWIND_TEST_DOCKER=1 "${PYTHON:-python3}" -m pytest -n 0 -q --durations=3 tests/docker "$@"
+LINKWIND_IMAGE=linkwind-under-test "${PYTHON:-python3}" -m tests.faults 10 container
 docker image ls linkwind-under-test
