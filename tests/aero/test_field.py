@@ -191,7 +191,7 @@ def test_a_wrong_expression_is_named_as_the_user_wrote_it():
     with pytest.raises(ExpressionError, match=r"^scene: aero\.field\.body\.tz: column 1: "):
         model(THETA, "aero.field.body.tz=oops")
     scenario = loads(SUBSET.replace('"x"', '"2*q"'), "subset")
-    with pytest.raises(ExpressionError, match=r"^subset: providers\[1\]\.field\.a\.fy: column 3: "):
+    with pytest.raises(ExpressionError, match=r'^subset: providers\[1\] "pull"\.field\.a\.fy: column 3: '):
         aero.build(scenario, scenario.providers[1])
 
 

@@ -52,7 +52,7 @@ def test_what_is_refused_before_the_start(changes, message):
         (["environment.wind=[1.0, 0.0, 0.5]"], "environment.wind: expected no component along z"),
         (["environment.density=0.0"], "environment.density: expected a number above 0 for the model flow"),
         (["bodies.0.inertia=[1.0, 1.0, 1.0, 0.0, 0.0, 0.0]"],
-         "bodies[0].inertia: expected one number: the model flow is two-dimensional"),
+         'bodies[0] "body".inertia: expected one number: the model flow is two-dimensional'),
     ],
 )  # fmt: skip
 def test_what_a_two_dimensional_flow_cannot_have(changes, message):
@@ -63,10 +63,12 @@ def test_what_a_two_dimensional_flow_cannot_have(changes, message):
 
 def test_a_body_without_shape_and_spans_that_differ():
     plain = text().replace('shape = { type = "plate", length = 1.0 }', "")
-    with pytest.raises(ScenarioError, match=r"bodies\[0\].shape: expected a shape, which the model"):
+    with pytest.raises(ScenarioError, match=r'bodies\[0\] "body".shape: expected a shape, which the model'):
         loads(plain, "scene.toml")
     wider = SECOND.replace("length = 1.0", "length = 1.0, span = 2.0")
-    with pytest.raises(ScenarioError, match=r"bodies\[1\].shape.span: expected the span of the others"):
+    with pytest.raises(
+        ScenarioError, match=r'bodies\[1\] "other".shape.span: expected the span of the others'
+    ):
         loads(text().replace("[aero]\n", f"{wider}[aero]\n"), "scene.toml")
 
 

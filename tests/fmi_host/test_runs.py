@@ -125,5 +125,7 @@ def test_files_and_scenarios_that_do_not_fit(tmp_path):
     with pytest.raises(InputError, match=r"--force-fmu areo=.*expected a provider of .*, aero; got areo"):
         load_with("two_link", [], [f"areo={file}"])
     scenario = load("two_link")
-    with pytest.raises(InputError, match=r'aero\.model: expected "fmu" for .*--set aero\.model=fmu'):
+    with pytest.raises(
+        InputError, match=r'aero\.model: expected "fmu" for .*--set providers\.aero\.model=fmu'
+    ):
         aero.build(scenario, scenario.providers[0], file)

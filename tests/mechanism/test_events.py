@@ -60,23 +60,24 @@ def test_only_joints_that_may_be_released_have_room():
 
 
 WRONG = [
-    ([event(joint="cd")], 'events[0].joint: expected one of the joints ab, bc, ac; got "cd". Use "bc".'),
+    ([event(joint="cd")], 'events[0] "e".joint: expected one of the joints ab, bc, ac; got "cd". Use "bc".'),
     ([event(at=0.1, when="force", above=1.0)],
-     "events[0].at: expected a time (at) or a condition (when), not both; got at besides when. "
+     'events[0] "e".at: expected a time (at) or a condition (when), not both; got at besides when. '
      "Write two events, or remove one of them."),
     ([event(when="force")],
-     'events[0].when: expected one of above and below with it; got neither. Write for example '
+     'events[0] "e".when: expected one of above and below with it; got neither. Write for example '
      'when = "force", above = 10.0.'),
     ([event(above=3.0)],
-     "events[0].above: expected when besides it; got nothing. "
+     'events[0] "e".above: expected when besides it; got nothing. '
      'Add for example when = "force", or remove above.'),
     ([event(joint="ac", when="position", above=1.0)],
-     "events[0].when: expected force, torque or distance, because ac (distance) has no single coordinate; "
+     'events[0] "e".when: expected force, torque or distance, because ac (distance) has no single '
+     'coordinate; '
      'got "position". Choose another.'),
     ([event(), event()],
      'events[1].name: expected a name of its own (events[0] has it); got "e". Rename one of the two.'),
     ([event(joint="ac", action="lock", at=0.1)],
-     'events[0].action: expected release, because ac closes a loop; got "lock". Move ac before the other '
+     'events[0] "e".action: expected release, because ac closes a loop; got "lock". Move ac before the other '
      "joint of its child in the file, so that that one closes the loop."),
 ]  # fmt: skip
 
@@ -92,14 +93,14 @@ def test_wrong_stops_get_their_line():
     for stop, line in (
         (
             [1.0, -1.0],
-            "joints[0].stop: expected two numbers, the lower one first; got [1.0, -1.0]. Swap them.",
+            'joints[0] "ab".stop: expected two numbers, the lower one first; got [1.0, -1.0]. Swap them.',
         ),
-        ([1.0], "joints[0].stop: expected a list of 2 numbers; got [1.0]. Write [lowest, highest]."),
+        ([1.0], 'joints[0] "ab".stop: expected a list of 2 numbers; got [1.0]. Write [lowest, highest].'),
     ):
         with pytest.raises(LinkwindError) as caught:
             build(scenario(joints=[HINGES[0] | {"stop": stop}]))
         assert str(caught.value).split(": ", 1)[1] == line
     with pytest.raises(
-        LinkwindError, match=r"joints\[2\]\.stop: expected none, because ac \(distance\) has no"
+        LinkwindError, match=r'joints\[2\] "ac"\.stop: expected none, because ac \(distance\) has no'
     ):
         build(scenario(joints=[*HINGES[:2], HINGES[2] | {"stop": [0, 1]}]))

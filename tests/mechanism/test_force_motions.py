@@ -344,20 +344,22 @@ MOTOR = {"type": "actuator", "name": "motor", "joint": "pin", "force": "0"}
 @pytest.mark.parametrize(
     ("forces", "message"),
     [
-        ([MOTOR | {"joint": "pim"}], r'forces\[0\]\.joint: expected one of the joints .*Use "pin"'),
-        ([MOTOR | {"force": {}}], r"forces\[0\]\.force: expected an expression or a table; got neither"),
+        ([MOTOR | {"joint": "pim"}], r'forces\[0\] "motor"\.joint: expected one of the joints .*Use "pin"'),
+        ([MOTOR | {"force": {}}], r'forces\[0\] "motor"\.force: expected an expression or a table; got '
+         r'neither'),
         ([MOTOR | {"force": {"table": [[0, 0], [0, 1]]}}], r"force\.table\[1\]: expected a variable above"),
         ([MOTOR | {"force": {"table": [[0, 0]]}}], r"force\.table: expected at least one entry"),
         ([MOTOR | {"force": {"table": [[0, 0], [1, 1]], "periodic": True}}], r"\[1\]: expected a last value"),
-        ([MOTOR | {"coordinate": 1}], r"forces\[0\]\.coordinate: expected 0, because a revolute"),
-        ([MOTOR | {"force": "2*x"}], r"forces\[0\]\.force: column 3: expected one of t, q, v"),
+        ([MOTOR | {"coordinate": 1}], r'forces\[0\] "motor"\.coordinate: expected 0, because a revolute'),
+        ([MOTOR | {"force": "2*x"}], r'forces\[0\] "motor"\.force: column 3: expected one of t, q, v'),
         ([FLAP | {"position": "sin(x)"}], r'expected one of t, pi; got "x"\. Use one of these\.'),
-        ([FLAP | {"position": "sin(t"}], r"forces\[0\]\.position: expected an expression"),
-        ([FLAP | {"position": "log(t)"}], r"forces\[0\]\.position: expected a number with a rate"),
+        ([FLAP | {"position": "sin(t"}], r'forces\[0\] "flap"\.position: expected an expression'),
+        ([FLAP | {"position": "log(t)"}], r'forces\[0\] "flap"\.position: expected a number with a rate'),
         ([FLAP | {"position": {"table": [[0, 0], [1, 1]]}}], r'interpolation: expected "cubic"'),
-        ([FLAP, FLAP | {"name": "g"}], r"forces\[1\]\.joint: expected a coordinate without another motion"),
-        ([{"type": "buoyancy", "name": "b", "body": "arm"}], r"forces\[0\]\.volume: .*arm has no shape"),
-        ([{"type": "sprung", "name": "b"}], r"forces\[0\]\.type: expected one of spring, actuator"),
+        ([FLAP, FLAP | {"name": "g"}], r'forces\[1\] "g"\.joint: expected a coordinate without another '
+         r'motion'),
+        ([{"type": "buoyancy", "name": "b", "body": "arm"}], r'forces\[0\] "b"\.volume: .*arm has no shape'),
+        ([{"type": "sprung", "name": "b"}], r'forces\[0\] "b"\.type: expected one of spring, actuator'),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_is_refused(forces, message):
@@ -370,7 +372,7 @@ def test_a_motion_of_a_joint_without_single_coordinates_is_refused():
     solid = ROD | {"inertia": [0.1, 0.2, 0.3, 0, 0, 0]}
     for joint in (ball, flight):
         with pytest.raises(
-            MechanismError, match=r"forces\[0\]\.joint: expected a revolute, .*which is (sph|free)"
+            MechanismError, match=r'forces\[0\] "flap"\.joint: expected a revolute, .*which is (sph|free)'
         ):
             build(scenario([solid], [joint], [FLAP]))
 

@@ -30,8 +30,11 @@ def test_a_spring_is_at_rest_as_it_starts_unless_it_says_so():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"parent_point": [3.0, 4.0]}, r"forces\[0\]: expected ends apart, because tether pulls .* got 0 m"),
-        ({"child_point": [0, 0, 1.0]}, r"forces\[0\]\.child_point: expected z = 0"),
+        (
+            {"parent_point": [3.0, 4.0]},
+            r'forces\[0\] "tether": expected ends apart, because tether pulls .* got 0 m',
+        ),
+        ({"child_point": [0, 0, 1.0]}, r'forces\[0\] "tether"\.child_point: expected z = 0'),
     ],
 )
 def test_springs_that_do_not_fit_are_refused(change, message):
@@ -42,10 +45,19 @@ def test_springs_that_do_not_fit_are_refused(change, message):
 @pytest.mark.parametrize(
     ("forces", "message"),
     [
-        ([SPRING | {"child": "bal"}], r'forces\[0\]\.child: expected one of the bodies .*Use "ball"'),
-        ([SPRING | {"child": "world"}], r"forces\[0\]\.child: expected another body than the parent"),
+        (
+            [SPRING | {"child": "bal"}],
+            r'forces\[0\] "tether"\.child: expected one of the bodies .*Use "ball"',
+        ),
+        (
+            [SPRING | {"child": "world"}],
+            r'forces\[0\] "tether"\.child: expected another body than the parent',
+        ),
         ([SPRING, SPRING], r"forces\[1\]\.name: expected a name of its own"),
-        ([SPRING | {"stiffness": -1.0}], r"forces\[0\]\.stiffness: expected a number of at least 0 \[N/m\]"),
+        (
+            [SPRING | {"stiffness": -1.0}],
+            r'forces\[0\] "tether"\.stiffness: expected a number of at least 0 \[N/m\]',
+        ),
         ([SPRING | {"stifness": 1.0}], r'stifness: expected a key among .*Use "stiffness"'),
     ],
 )

@@ -124,31 +124,36 @@ def test_a_distance_swings_like_a_massless_rod():
 OPEN = "Correct points and start, or leave out the start of bodies that are to find their place."
 WRONG = [
     (four_bar(ground=6.0),
-     r"joints\[3\]: expected rod and rocker to meet in c \(revolute\) at the start; got a loop that stays "
+     r'joints\[3\] "c": expected rod and rocker to meet in c \(revolute\) at the start; got a loop that '
+     r'stays '
      r"open by 2\.\d+ m \(or rad\), in a mechanism of 6 m\. " + OPEN),
     (four_bar(90.0, 10.0, 90.0),
-     r"joints\[3\]: expected rod and rocker to meet in c \(revolute\) at the start; got a loop that stays "
+     r'joints\[3\] "c": expected rod and rocker to meet in c \(revolute\) at the start; got a loop that '
+     r'stays '
      r"open by 0\.\d+ m"),
     (four_bar(angular_velocity=40.0),
-     r"joints\[3\]: expected velocities of rod and rocker that keep c closed; got some that open it at \d+"),
+     r'joints\[3\] "c": expected velocities of rod and rocker that keep c closed; got some that open it '
+     r'at \d+'),
     (scenario(
         [{"name": "a"} | ROD, {"name": "b"} | ROD],
         [pin("h", "a", "b", [1, 0], [-1, 0]), pin("k", "a", "b", [1, 0], [-1, 0], "planar")]),
-     r"joints\[1\].type: expected fixed, revolute, prismatic or distance, because b is carried by another "
+     r'joints\[1\] "k".type: expected fixed, revolute, prismatic or distance, because b is carried by '
+     r'another '
      r'joint, so that k closes a loop; got "planar", which keeps nothing\. Remove it\.'),
     (scenario(
         [{"name": "a"} | ROD, {"name": "b"} | ROD],
         [pin("h", "a", "b", [1, 0], [-1, 0]), pin("k", "a", "b", [1, 0], [-1, 0], stiffness=3.0)]),
-     r"joints\[1\].stiffness: expected none, because b is carried by another joint, so that k closes a loop; "
+     r'joints\[1\] "k".stiffness: expected none, because b is carried by another joint, so that k '
+     r'closes a loop; '
      r"got 3\.0\. Move the spring to a joint before it in the file\."),
     (scenario([{"name": "a"} | ROD], [pin("d", "world", "a", [0, 0], [0, 0], "distance")]),
-     r"joints\[0\]: expected two points apart, whose distance d is to keep; got 0 m at the start\."),
+     r'joints\[0\] "d": expected two points apart, whose distance d is to keep; got 0 m at the start\.'),
     # a flat parallelogram may go on as one or fold as an antiparallelogram
     (scenario(
         [{"name": "a"} | ROD, {"name": "b"} | ROD, {"name": "c"} | ROD],
         [pin("p1", "world", "a", [0, 0], [-0.5, 0]), pin("p2", "a", "b", [0.5, 0], [-1, 0]),
          pin("p3", "world", "c", [2, 0], [-0.5, 0]), pin("p4", "b", "c", [1, 0], [0.5, 0])]),
-     r"joints\[3\]: expected a start from which the motion is settled; got a singular one, in which the "
+     r'joints\[3\] "p4": expected a start from which the motion is settled; got a singular one, in which the '
      r"loops keep 1 directions and a little further 2\. Start in another position\."),
 ]  # fmt: skip
 

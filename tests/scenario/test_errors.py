@@ -22,9 +22,9 @@ PLATE = 'shape = { type = "plate", length = 0.5, span = 1.0 }'
 WRONG = [
     # keys
     ("angle_deg = 200.0", "angle = 200.0",
-     f'bodies[0].angle: expected a key among {BODY_KEYS}; got "angle". Use "angle_deg".'),
+     f'bodies[0] "link1".angle: expected a key among {BODY_KEYS}; got "angle". Use "angle_deg".'),
     ("mass = 2.0", "mas = 2.0",
-     f'bodies[0].mas: expected a key among {BODY_KEYS}; got "mas". Use "mass".'),
+     f'bodies[0] "link1".mas: expected a key among {BODY_KEYS}; got "mas". Use "mass".'),
     ("[aero.plate]", "[aero.plat]",
      'aero.plat: expected a key among name, model, bodies, plate, field, flow, fmu; '
      'got "plat". Use "plate".'),
@@ -37,10 +37,10 @@ WRONG = [
     ("[aero]", '[aero]\nname = "wind"',
      'aero.name: expected no name besides aero; got "wind". Remove it, or write [[providers]].'),
     ("mass = 2.0 ", "",
-     "bodies[0].mass: expected a value (Mass [kg]); got nothing. Add mass."),
+     'bodies[0] "link1".mass: expected a value (Mass [kg]); got nothing. Add mass.'),
     # names of choices
     ('"revolute"', '"hinge"',
-     "joints[0].type: expected one of fixed, revolute, prismatic, planar, spherical, free, distance; "
+     'joints[0] "hinge".type: expected one of fixed, revolute, prismatic, planar, spherical, free, distance; '
      'got "hinge". Use "revolute".'),
     ('"pec"', '"strong"', 'coupling.scheme: expected one of explicit, pec, implicit; '
     'got "strong". Use one of these.'),
@@ -57,8 +57,10 @@ WRONG = [
      'aero.model: expected one of none, field, plate, flow, fmu; got "lbm". Use one of these.'),
     # types
     ("mass = 2.0", 'mass = "2 kg"',
-     'bodies[0].mass: expected a number [kg]; got "2 kg". Write the number alone, without quotes and unit.'),
-    ("mass = 2.0", "mass = true", "bodies[0].mass: expected a number [kg]; got true. Change the value."),
+     'bodies[0] "link1".mass: expected a number [kg]; got "2 kg". Write the number alone, without '
+     'quotes and unit.'),
+    ("mass = 2.0", "mass = true", 'bodies[0] "link1".mass: expected a number [kg]; got true. Change the '
+     'value.'),
     ("adaptive = true", 'adaptive = "yes"',
      'coupling.adaptive: expected true or false; got "yes". Write true or false, without quotes.'),
     ("order = 3", "order = 3.0",
@@ -71,18 +73,20 @@ WRONG = [
      'environment.gravity: expected a list of 2 or 3 numbers; got [0, "down"]. '
      "Write numbers without units or quotes."),
     ("angle_deg = 200.0", "orientation = [1, 0, 0]",
-     "bodies[0].orientation: expected a unit quaternion of 4 numbers [w, x, y, z]; got [1, 0, 0]. "
+     'bodies[0] "link1".orientation: expected a unit quaternion of 4 numbers [w, x, y, z]; got [1, 0, 0]. '
      "Write [w, x, y, z], body to world."),
-    (PLATE, "shape = 1", "bodies[0].shape: expected a table; got 1. Write it as [table] or { key = value }."),
+    (PLATE, "shape = 1", 'bodies[0] "link1".shape: expected a table; got 1. Write it as [table] or { '
+     'key = value }.'),
     # units and ranges
-    ("mass = 2.0", "mass = nan", "bodies[0].mass: expected a finite number [kg]; got nan. Change the value."),
+    ("mass = 2.0", "mass = nan", 'bodies[0] "link1".mass: expected a finite number [kg]; got nan. '
+     'Change the value.'),
     ("wind = [-5.0", "wind = [inf",
      "environment.wind: expected a list of 2 or 3 finite numbers; got [inf, 0.0, 0.0]. "
      "Write finite numbers."),
     ("mass = 2.0", "mass = -2.0",
-     "bodies[0].mass: expected a number of at least 0 [kg]; got -2.0. Change the value."),
+     'bodies[0] "link1".mass: expected a number of at least 0 [kg]; got -2.0. Change the value.'),
     (PLATE, PLATE.replace("0.5", "0"),
-     "bodies[0].shape.length: expected a number above 0 [m]; got 0. Change the value."),
+     'bodies[0] "link1".shape.length: expected a number above 0 [m]; got 0. Change the value.'),
     ("order = 3", "order = 4", "coupling.order: expected a number of at most 3; got 4. Change the value."),
     ("step = 1e-3", "step = 1.5e-10",
      "coupling.step: expected a whole number of nanoseconds; got 1.5e-10. Use 1e-09."),
@@ -93,30 +97,34 @@ WRONG = [
     ("end = 1.2 ", "end = 0.0004 ",
      "time.end: expected a multiple of coupling.step = 0.001 s; got 0.0004. Use 0.001."),
     ("angle_deg = 200.0", "orientation = [2, 0, 0, 0]",
-     "bodies[0].orientation: expected a unit quaternion of 4 numbers [w, x, y, z]; got [2, 0, 0, 0]. "
+     'bodies[0] "link1".orientation: expected a unit quaternion of 4 numbers [w, x, y, z]; got [2, 0, 0, 0]. '
      "Its norm is 2; use [1, 0, 0, 0]."),
     ("angle_deg = 200.0", "angle_deg = 200.0\norientation = [1, 0, 0, 0]",
-     "bodies[0].angle_deg: expected angle_deg or orientation, not both; got 200.0 besides orientation. "
+     'bodies[0] "link1".angle_deg: expected angle_deg or orientation, not both; got 200.0 besides '
+     'orientation. '
      "Remove one of the two."),
     ('type = "revolute"', 'type = "revolute"\naxis = [0, 0]',
-     "joints[0].axis: expected a vector that is not zero; got [0.0, 0.0, 0.0]. The default is [0, 0, 1]."),
+     'joints[0] "hinge".axis: expected a vector that is not zero; got [0.0, 0.0, 0.0]. The default is '
+     '[0, 0, 1].'),
     ('type = "revolute"', 'type = "revolute"\ndamping = -1',
-     "joints[0].damping: expected no number below 0; got -1.0. A negative one would feed energy."),
+     'joints[0] "hinge".damping: expected no number below 0; got -1.0. A negative one would feed energy.'),
     # inertia
     ("inertia = 1.4", "inertia = 0",
-     "bodies[0].inertia: expected a number above 0, or 6 numbers [Ixx, Iyy, Izz, Ixy, Ixz, Iyz]; got 0. "
+     'bodies[0] "link1".inertia: expected a number above 0, or 6 numbers [Ixx, Iyy, Izz, Ixy, Ixz, '
+     'Iyz]; got 0. '
      "Give the inertia about the centre of mass."),
     ("inertia = 1.4", "inertia = [1, 1]",
-     "bodies[0].inertia: expected a number above 0, or 6 numbers [Ixx, Iyy, Izz, Ixy, Ixz, Iyz]; "
+     'bodies[0] "link1".inertia: expected a number above 0, or 6 numbers [Ixx, Iyy, Izz, Ixy, Ixz, Iyz]; '
      "got [1, 1]. Give one number for a planar body."),
     ("inertia = 1.4", "inertia = [1, 1, 3, 0, 0, 0]",
-     "bodies[0].inertia: expected principal moments of which two add up to at least the third; "
+     'bodies[0] "link1".inertia: expected principal moments of which two add up to at least the third; '
      "got principal moments 1, 1, 3. No body has these: the largest is at most 2."),
     ("inertia = 1.4", "inertia = [1, 1, 1, 2, 0, 0]",
-     "bodies[0].inertia: expected an inertia without negative moments; got principal moments -1, 1, 3. "
+     'bodies[0] "link1".inertia: expected an inertia without negative moments; got principal moments '
+     '-1, 1, 3. '
      "No body has these; check signs and units."),
     ("inertia = 1.4", "inertia = [1, 1, 1, 0, 0, 0]",
-     "bodies[1].inertia: expected 6 numbers, because link1 is 3-D; got 1.4. "
+     'bodies[1] "link2".inertia: expected 6 numbers, because link1 is 3-D; got 1.4. '
      "Give [Ixx, Iyy, Izz, Ixy, Ixz, Iyz]."),
     # names
     ('name = "link1"', 'name = "link 1"',
@@ -126,11 +134,11 @@ WRONG = [
     ('name = "link1"', 'name = "link2"',
      'bodies[1].name: expected a name of its own (bodies[0] has it); got "link2". Rename one of the two.'),
     ('child = "link2"', 'child = "link3"',
-     'joints[0].child: expected one of the bodies link1, link2; got "link3". Use "link2".'),
+     'joints[0] "hinge".child: expected one of the bodies link1, link2; got "link3". Use "link2".'),
     ('child = "link2"', 'child = "world"',
-     'joints[0].child: expected one of the bodies link1, link2; got "world". Use one of these.'),
+     'joints[0] "hinge".child: expected one of the bodies link1, link2; got "world". Use one of these.'),
     ('parent = "link1"', 'parent = "lnk1"',
-     'joints[0].parent: expected one of the bodies link1, link2, world; got "lnk1". Use "link1".'),
+     'joints[0] "hinge".parent: expected one of the bodies link1, link2, world; got "lnk1". Use "link1".'),
     ("[aero]", '[aero]\nbodies = ["link1", "lnk2"]',
      'aero.bodies[1]: expected one of the bodies link1, link2; got "lnk2". Use "link2".'),
     ("[aero]", '[aero]\nbodies = ["link1", "link1"]',
@@ -138,13 +146,14 @@ WRONG = [
     ("[aero.plate]", '[aero.field.link3]\nfx = "1"\n[aero.plate]',
      'aero.field.link3: expected one of its bodies link1, link2; got "link3". Use "link2".'),
     ("[aero]", '[[providers]]\nname = "cfd"\nmodel = "plats"\n[aero]',
-     'providers[0].model: expected one of none, field, plate, flow, fmu; got "plats". Use "plate".'),
+     'providers[0] "cfd".model: expected one of none, field, plate, flow, fmu; got "plats". Use "plate".'),
     # topology
     ('child = "link2"', 'child = "link1"',
-     'joints[0].parent: expected another body than the child; got "link1". '
+     'joints[0] "hinge".parent: expected another body than the child; got "link1". '
      "Name the body that carries it, or world."),
     # what a model needs
-    (PLATE, "", 'bodies[0].shape: expected a plate, which the model of provider "aero" needs; got nothing. '
+    (PLATE, "", 'bodies[0] "link1".shape: expected a plate, which the model of provider "aero" needs; '
+     'got nothing. '
      'Add shape = { type = "plate", length = … }.'),
     ('model = "plate"', 'model = "field"',
      "aero.field: expected a table for at least one body; got nothing. "
@@ -172,7 +181,8 @@ def test_zero_mass_needs_a_model_that_adds_inertia():
     with pytest.raises(ScenarioError) as error:
         loads(text, "x", ["aero.model=none", "joints=[]"])
     assert str(error.value) == (
-        "x: bodies[0].mass: expected a number above 0 [kg], because no provider adds inertia to this body; "
+        'x: bodies[0] "link1".mass: expected a number above 0 [kg], because no provider adds inertia to '
+        "this body; "
         "got 0.0. Give it a mass, or the model plate or flow."
     )
 
@@ -182,7 +192,8 @@ def test_a_rod_may_have_no_inertia_about_itself_if_something_holds_it():
     with pytest.raises(ScenarioError) as error:
         loads(rod, "x")
     assert str(error.value) == (
-        "x: bodies[0].inertia: expected principal moments above 0, because nothing holds or hangs on this "
+        'x: bodies[0] "a".inertia: expected principal moments above 0, because nothing holds or hangs '
+        "on this "
         "body; got [0.0, 0.1, 0.1, 0.0, 0.0, 0.0]. Correct it."
     )
     held = '[[joints]]\nname = "j"\ntype = "revolute"\nparent = "world"\nchild = "a"\n'
@@ -201,7 +212,7 @@ def test_a_rod_may_have_no_inertia_about_itself_if_something_holds_it():
 def test_a_picture_is_checked(picture, line):
     with pytest.raises(ScenarioError) as error:
         loads(edited("inertia = 0.1", f"inertia = 0.1\npicture = [{picture}]", SMALL), "x")
-    assert str(error.value).startswith(f"x: bodies[0].picture[0].{line}")
+    assert str(error.value).startswith(f'x: bodies[0] "a".picture[0].{line}')
 
 
 def test_a_flat_body_fulfils_the_triangle_inequality_with_equality():
@@ -217,13 +228,40 @@ def test_several_problems_are_reported_a_line_each_the_first_few():
         loads(text, "x")
     lines = str(error.value).splitlines()
     assert [line.split(": ")[1] for line in lines[:-1]] == [
-        "bodies[0].mass",
-        "bodies[0].inertia",
-        "bodies[1].mass",
-        "bodies[1].inertia",
-        "joints[0].parent_point",
+        'bodies[0] "link1".mass',
+        'bodies[0] "link1".inertia',
+        'bodies[1] "link2".mass',
+        'bodies[1] "link2".inertia',
+        'joints[0] "hinge".parent_point',
     ]
     assert lines[-1] == "x: and 3 more"
+
+
+TOGETHER = [
+    # a table that is wrong hides nothing that the others say of each other
+    (['model = "plate"', 'parent = "link1"', "end = 1.2 "],
+     ['model = "plats"', 'parent = "lnk1"', "end = 1.2345 "],
+     ["aero.model", "time.end", 'joints[0] "hinge".parent']),
+    # of a body that is wrong, the name is known all the same
+    (["mass = 2.0", 'child = "link2"'], ["mass = -1", 'child = "link3"'],
+     ['bodies[0] "link1".mass', 'joints[0] "hinge".child']),
+    # but what follows from the first line is not told as well: names, and tables of another name
+    (['name = "link1"'], ['nom = "link1"'], ["bodies[0].nom"]),
+    (['name = "link2"'], ["name = 2"], ["bodies[1].name"]),
+    (["[[joints]]", "[aero]"], ["[[joint]]", '[[events]]\nname = "e"\njoint = "hinge"\n[aero]'],
+     ['events[0] "e".action', "joint"]),
+    (["[coupling]", "end = 1.2 "], ["[couplings]", "end = 1.2345 "], ["couplings"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "items"), TOGETHER)
+def test_all_that_can_be_known_is_told_at_once(old, new, items):
+    text = TWO_LINK
+    for before, after in zip(old, new, strict=True):
+        text = edited(before, after, text)
+    with pytest.raises(ScenarioError) as error:
+        loads(text, "x")
+    assert [line.split(": ")[1] for line in str(error.value).splitlines()] == items
 
 
 @pytest.mark.parametrize(

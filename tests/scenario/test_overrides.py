@@ -81,12 +81,12 @@ def test_aero_can_be_set_where_the_file_has_no_provider():
          "coupling.step: expected a table with the key x; got 0.001. "
          "Set it as a whole, or name one of its own keys."),
         ("bodies.0.mass=x",
-         'bodies[0].mass: expected a number [kg]; got "x". '
+         'bodies[0] "link1".mass: expected a number [kg]; got "x". '
          "Write the number alone, without quotes and unit."),
         ("coupling.adaptive=True",
          'coupling.adaptive: expected true or false; got "True". Write true or false, without quotes.'),
         ("bodies.link1.mass=inf",
-         "bodies[0].mass: expected a finite number [kg]; got inf. Change the value."),
+         'bodies[0] "link1".mass: expected a finite number [kg]; got inf. Change the value.'),
         ("aero.model=plats",
          'aero.model: expected one of none, field, plate, flow, fmu; got "plats". Use "plate".'),
         ("bodies=3", "bodies: expected a list; got 3. Write it as [[table]] or [a, b]."),
@@ -102,7 +102,8 @@ def test_a_line_break_sets_no_second_key():
     with pytest.raises(ScenarioError) as error:
         loads(TWO_LINK, "x", ["bodies.0.mass=1\ntime.end=2"])
     assert str(error.value) == (
-        '--set bodies.0.mass=1 time.end=2: bodies[0].mass: expected a number [kg]; got "1\\ntime.end=2". '
+        '--set bodies.0.mass=1 time.end=2: bodies[0] "link1".mass: expected a number [kg]; got '
+        '"1\\ntime.end=2". '
         "Write the number alone, without quotes and unit."
     )
 

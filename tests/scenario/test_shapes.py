@@ -99,7 +99,7 @@ WRONG = [
 def test_a_wrong_shape_gets_its_line(text, line):
     with pytest.raises(ScenarioError) as error:
         body(text)
-    assert str(error.value) == f"s.toml: bodies[0].shape.{line}"
+    assert str(error.value) == f's.toml: bodies[0] "a".shape.{line}'
 
 
 @pytest.mark.parametrize(
@@ -125,7 +125,7 @@ def test_the_plate_model_names_what_it_got():
     with pytest.raises(ScenarioError) as error:
         loads(edited(PLATE, 'shape = { type = "circle", diameter = 0.5 }', TWO_LINK), "two_link.toml")
     assert str(error.value) == (
-        'two_link.toml: bodies[0].shape: expected a plate, which the model of provider "aero" needs; '
+        'two_link.toml: bodies[0] "link1".shape: expected a plate, which the model of provider "aero" needs; '
         'got type "circle". Write shape = { type = "plate", length = … }.'
     )
 

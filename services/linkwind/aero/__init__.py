@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from linkwind.aero.base import Capabilities, ForceModel, item, table
+from linkwind.aero.base import Capabilities, ForceModel, item
 from linkwind.aero.field import ForceField
 from linkwind.aero.flow import Flow
 from linkwind.aero.none import Vacuum
@@ -52,7 +52,7 @@ def build(scenario: Scenario, provider: Provider, file: Path | None = None) -> F
     if file is not None:
         raise InputError(
             f'{item(scenario, provider, "model")}: expected "fmu" for {file}; got "{provider.model}". Start '
-            f"the dynamics with --set {table(scenario, provider)}.model=fmu."
+            f"the dynamics with --set providers.{provider.name}.model=fmu."
         )
     return MODELS[provider.model](scenario, provider)
 

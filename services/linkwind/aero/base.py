@@ -79,15 +79,12 @@ class ForceModel(Protocol):
         """
 
 
-def table(scenario: Scenario, provider: Provider) -> str:
-    """Return the table of a provider as a user writes it: ``aero``."""
-    index = [other.name for other in scenario.providers].index(provider.name)
-    return "aero" if index == 0 and provider.name == "aero" else f"providers[{index}]"
-
-
 def item(scenario: Scenario, provider: Provider, *keys: str) -> str:
     """Return how a user finds a setting of a provider: ``two_link.toml: aero.field.link1``."""
-    return f"{scenario.source}: {'.'.join((table(scenario, provider), *keys))}"
+    index = [other.name for other in scenario.providers].index(provider.name)
+    short = index == 0 and provider.name == "aero"
+    table = f"{scenario.source}: aero" if short else scenario.where("providers", index)
+    return ".".join((table, *keys))
 
 
 def body_indices(scenario: Scenario, provider: Provider) -> list[int]:

@@ -28,7 +28,7 @@ def plate_table(scenario: Scenario, provider: Provider) -> PlateTable:
         if shape is None or shape.type != "plate":
             got = f'type "{shape.type}"' if shape else "none"
             raise ScenarioError(
-                f'{scenario.source}: bodies[{index}].shape: expected type "plate" with length and span, '
+                f'{scenario.where("bodies", index)}.shape: expected type "plate" with length and span, '
                 f'for aero model "plate"; got {got}. Add shape = {{ type = "plate", length = … }}.'
             )
         size.append((shape.length, shape.span))

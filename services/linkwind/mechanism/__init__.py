@@ -69,7 +69,7 @@ def build(scenario: Scenario) -> Mechanism:
     joints: dict[int, JointStart] = {}
     moved = prescribed(scenario, carried)
     for i in order([carrier.parent for carrier in carried]):
-        item = f"{scenario.source}: bodies[{i}]"
+        item = scenario.where("bodies", i)
         given = moved.get(carried[i].name, {})
         bodies[i], joints[i] = start(scenario.bodies[i], carried[i], bodies[carried[i].parent], item, given)
     count = range(len(carried))

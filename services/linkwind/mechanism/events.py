@@ -47,7 +47,7 @@ def happenings(scenario: Scenario, carriers: list[Carrier], loops: list[Loop]) -
     for i, event in enumerate(scenario.events):
         joint = place[event.joint]
         if event.action == "lock" and joint >= len(carriers):
-            _refuse(f"{scenario.source}: events[{i}].action: expected release", event.joint, '"lock"')
+            _refuse(f"{scenario.where('events', i)}.action: expected release", event.joint, '"lock"')
         if event.at is not None:
             found.append(Happening(event.name, joint, event.action, "time", 1, event.at))
             continue
@@ -58,9 +58,7 @@ def happenings(scenario: Scenario, carriers: list[Carrier], loops: list[Loop]) -
         if stated.stop is None:
             continue
         if place[stated.name] >= len(carriers):
-            _refuse(
-                f"{scenario.source}: joints[{i}].stop: expected none", stated.name, str(list(stated.stop))
-            )
+            _refuse(f"{scenario.where('joints', i)}.stop: expected none", stated.name, str(list(stated.stop)))
         for end, side, threshold in (("low", -1, stated.stop[0]), ("high", 1, stated.stop[1])):
             name, e = f"{stated.name}.{end}", stated.restitution
             found.append(Happening(name, place[stated.name], "stop", "position", side, threshold, e))

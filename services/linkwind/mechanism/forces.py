@@ -77,7 +77,7 @@ def with_forces(
     multibody = Multibody(tables)
     start = Motion.at_rest(multibody.n)
     multibody.motion(multibody.initial_state(q, v), start)
-    items = [f"{scenario.source}: forces[{i}]" for i in chosen]
+    items = [scenario.where("forces", i) for i in chosen]
     elements = [
         _element(scenario.forces[i], scenario, carriers, start, item)
         for i, item in zip(chosen, items, strict=True)
@@ -140,7 +140,7 @@ def prescribed(scenario: Scenario, carriers: list[Carrier]) -> dict[str, dict[in
     for i, force in enumerate(scenario.forces):
         if not isinstance(force, Prescribed):
             continue
-        item = f"{scenario.source}: forces[{i}]"
+        item = scenario.where("forces", i)
         _coordinate(force, carriers, item)
         program = motion_program(force, item)
         start = derivatives(program.code, program.constants, 0.0)

@@ -76,13 +76,13 @@ def carriers(scenario: Scenario) -> tuple[list[Carrier], list[Loop]]:
     index = {body.name: i for i, body in enumerate(scenario.bodies)} | {"world": WORLD}
     root = "planar" if scenario.planar else "free"
     found = [
-        Carrier(f"world-{body.name}", root, WORLD, None, f"{scenario.source}: bodies[{i}]")
+        Carrier(f"world-{body.name}", root, WORLD, None, scenario.where("bodies", i))
         for i, body in enumerate(scenario.bodies)
     ]
     loops = []
     carrying = carries((joint.type, joint.parent, joint.child) for joint in scenario.joints)
     for i, joint in enumerate(scenario.joints):
-        item = f"{scenario.source}: joints[{i}]"
+        item = scenario.where("joints", i)
         if scenario.planar:
             _check_planar(joint, item)
         parent, child = index[joint.parent], index[joint.child]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from decimal import Decimal
 from typing import TYPE_CHECKING
 
@@ -22,16 +22,20 @@ RESERVED = ("dynamics", "observer", "router", "ca")  # that a provider must not 
 
 SINGLE = ("revolute", "prismatic")  # joint types with one coordinate
 
+NAMED = ("bodies", "joints", "events", "forces", "providers")  # lists of tables
 
-def disagreements(scenario: Scenario) -> list[Problem]:
-    """Return everything that does not fit together, in the order of the file."""
-    repeated = list(_names(scenario))
+
+def disagreements(scenario: Scenario, known: Collection[str]) -> list[Problem]:
+    """Return everything that does not fit together, in the order of the file, as far as it can be known.
+
+    Args:
+        scenario: with the tables that are right in themselves.
+        known: these, and the tables of which only the names are known, see ``sound``.
+    """
+    repeated = [problem for table in NAMED if f"{table}.name" in known for problem in _names(scenario, table)]
     if repeated:
         return repeated  # what a name refers to is not known
-    problems = [problem for check in CHECKS for problem in check(scenario)]
-    for index, provider in enumerate(scenario.providers):
-        problems += _provider(scenario, provider, ("providers", index))
-    return problems + list(_masses(scenario))
+    return [problem for check, reads in CHECKS.items() if reads <= set(known) for problem in check(scenario)]
 
 
 def _end(scenario: Scenario) -> Iterator[Problem]:
@@ -43,19 +47,12 @@ def _end(scenario: Scenario) -> Iterator[Problem]:
         yield Problem(("time", "end"), expected, show(scenario.time.end), f"Use {' or '.join(use)}.")
 
 
-def _names(scenario: Scenario) -> Iterator[Problem]:
-    tables = {
-        "bodies": [body.name for body in scenario.bodies],
-        "joints": [joint.name for joint in scenario.joints],
-        "events": [event.name for event in scenario.events],
-        "forces": [force.name for force in scenario.forces],
-        "providers": [provider.name for provider in scenario.providers],
-    }
-    for table, names in tables.items():
-        for index, name in enumerate(names):
-            if name in names[:index]:
-                expected = f"a name of its own ({table}[{names.index(name)}] has it)"
-                yield Problem((table, index, "name"), expected, show(name), "Rename one of the two.")
+def _names(scenario: Scenario, table: str) -> Iterator[Problem]:
+    names = [entry.name for entry in getattr(scenario, table)]
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            expected = f"a name of its own ({table}[{names.index(name)}] has it)"
+            yield Problem((table, index, "name"), expected, show(name), "Rename one of the two.")
 
 
 def _inertias(scenario: Scenario) -> Iterator[Problem]:
@@ -93,6 +90,9 @@ def _events(scenario: Scenario) -> Iterator[Problem]:
         elif event.when in ("position", "speed") and joint.type not in SINGLE:
             expected = "force, torque or distance, because " + _no_coordinate(joint)
             yield Problem(("events", index, "when"), expected, show(event.when), "Choose another.")
+
+
+def _stops(scenario: Scenario) -> Iterator[Problem]:
     for index, joint in enumerate(scenario.joints):
         if joint.stop is not None and joint.type not in SINGLE:
             expected = "none, because " + _no_coordinate(joint)
@@ -114,6 +114,10 @@ def _forces(scenario: Scenario) -> Iterator[Problem]:
         if force.type == "spring" and force.parent == force.child:
             expected, advice = "another body than the parent", "Name another body, or world."
             yield Problem(("forces", index, "child"), expected, show(force.child), advice)
+
+
+def _motions(scenario: Scenario) -> Iterator[Problem]:
+    for index, force in enumerate(scenario.forces):
         if force.type == "motion" and force.joint in _changing(scenario):
             expected = "a joint to which nothing else happens"
             got = f'"{force.joint}", which has events or stops'
@@ -140,12 +144,14 @@ def _method(scenario: Scenario) -> Iterator[Problem]:
         yield Problem(("dynamics", "stabilisation_time"), expected, got, advice)
 
 
-def _provider(scenario: Scenario, provider: Provider, path: Path) -> Iterator[Problem]:
-    if provider.name in RESERVED:
-        expected = "a name that no other participant has"
-        yield Problem((*path, "name"), expected, show(provider.name), 'Choose another, such as "aero".')
-    yield from _provider_bodies(scenario, provider, path)
-    yield from _provider_model(scenario, provider, path)
+def _providers(scenario: Scenario) -> Iterator[Problem]:
+    for index, provider in enumerate(scenario.providers):
+        path: Path = ("providers", index)
+        if provider.name in RESERVED:
+            expected = "a name that no other participant has"
+            yield Problem((*path, "name"), expected, show(provider.name), 'Choose another, such as "aero".')
+        yield from _provider_bodies(scenario, provider, path)
+        yield from _provider_model(scenario, provider, path)
 
 
 def _provider_bodies(scenario: Scenario, provider: Provider, path: Path) -> Iterator[Problem]:
@@ -205,9 +211,6 @@ def _flow(scenario: Scenario, provider: Provider, path: Path) -> Iterator[Proble
         yield Problem(("environment", "density"), "a number above 0 for the model flow", "0", "Give it one.")
 
 
-CHECKS = (_end, _inertias, _joints, _events, _forces, _method)
-
-
 def _first(names: Sequence[str]) -> str:
     return names[0] if names else "body"
 
@@ -239,3 +242,18 @@ def _spins_freely(body: Body) -> bool:
     xx, yy, zz, xy, xz, yz = body.inertia
     low, _, high = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     return bool(low <= 1e-14 * high)
+
+
+# What each check reads: tables, or no more than the names of their entries.
+CHECKS: dict[Callable[[Scenario], Iterator[Problem]], set[str]] = {
+    _end: {"time", "coupling"},
+    _inertias: {"bodies"},
+    _joints: {"joints", "bodies.name"},
+    _events: {"events", "joints"},
+    _stops: {"joints"},
+    _forces: {"forces", "bodies.name", "joints.name"},
+    _motions: {"forces", "joints", "events"},
+    _method: {"dynamics", "coupling"},
+    _providers: {"providers", "bodies", "environment"},
+    _masses: {"bodies", "joints", "providers"},
+}

@@ -6,6 +6,7 @@ import copy
 import json
 import tomllib
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, NoReturn
@@ -14,10 +15,12 @@ from pydantic import ValidationError
 
 from linkwind.errors import ScenarioError
 from linkwind.scenario import translation
+from linkwind.scenario.agreement import disagreements
 from linkwind.scenario.model import Scenario
 from linkwind.scenario.overrides import override
 from linkwind.scenario.problems import Problem, ProblemError, nearest
 from linkwind.scenario.shorthand import Source, expand
+from linkwind.scenario.sound import sound
 
 SHOWN = 5  # problems that one error reports, a line each
 
@@ -100,20 +103,27 @@ def _flat(error: Exception) -> str:
 
 
 def _scenario(data: dict[str, Any], name: str, overrides: Sequence[str]) -> Scenario:
-    source = Source(name, shorthand=False, overridden={})
+    source = Source(name, shorthand=False, overridden={}, data=data)
     try:
         data, shorthand = expand(copy.deepcopy(data), Path(name).stem)
-        source = Source(name, shorthand, {})
+        source = Source(name, shorthand, {}, data)
         for argument in overrides:
             try:
                 source.overridden[override(data, argument)] = argument
             except ProblemError as error:
-                _refuse(error.problems, Source(f"--set {argument}", shorthand, {}))
-        return Scenario.model_validate(data)
+                _refuse(error.problems, replace(source, file=f"--set {argument}", overridden={}))
     except ProblemError as error:
         _refuse(error.problems, source)
+    tables: dict[str, Any] = {}
+    try:
+        scenario = Scenario.model_validate(data, context=tables)
+        problems = []
     except ValidationError as error:
-        _refuse(translation.problems(error, Scenario), source)
+        problems = translation.problems(error, Scenario)
+    problems += disagreements(*sound(data, tables, problems))
+    if problems:
+        _refuse(problems, source)
+    return scenario
 
 
 def _refuse(problems: Sequence[Problem], source: Source) -> NoReturn:

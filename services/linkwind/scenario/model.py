@@ -1,16 +1,16 @@
-"""The scenario as a whole: its tables, and what they must agree on."""
+"""The scenario as a whole: its tables. Loading checks what they must agree on."""
 
 from __future__ import annotations
 
 import json
+from typing import Any
 
-from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
+from pydantic import Field, PrivateAttr, ValidationInfo, field_validator
 
-from linkwind.scenario.agreement import disagreements
 from linkwind.scenario.bodies import Body, Joint
 from linkwind.scenario.events import Event
 from linkwind.scenario.forces import Force
-from linkwind.scenario.problems import ProblemError
+from linkwind.scenario.problems import item
 from linkwind.scenario.providers import Provider
 from linkwind.scenario.quantities import Section
 from linkwind.scenario.settings import (
@@ -65,17 +65,22 @@ class Scenario(Section):
             for provider in providers
         )
 
-    @model_validator(mode="after")
-    def _agree(self) -> Scenario:
-        problems = disagreements(self)
-        if problems:
-            raise ProblemError(problems)
-        return self
+    @field_validator("*")
+    @classmethod
+    def _sound(cls, value: Any, info: ValidationInfo) -> Any:
+        """Put a table that is right in itself into the context, if there is one, whatever others are."""
+        if info.context is not None:
+            info.context[info.field_name] = value
+        return value
 
     @property
     def source(self) -> str:
         """What errors call the scenario: the file as the user gave it, where that is known."""
         return self._source or f"{self.name}.toml"
+
+    def where(self, table: str, index: int) -> str:
+        """Return what errors call an entry of a list of tables: ``two_link.toml: joints[0] "hinge"``."""
+        return f"{self.source}: {item((table, index), getattr(self, table)[index].name)}"
 
     def called(self, source: str) -> None:
         """Remember the file that the scenario came from; it is no part of the scenario itself."""

@@ -47,10 +47,10 @@ class Problem:
         """Return the same problem, seen from ``path`` levels further up."""
         return replace(self, path=path + self.path)
 
-    def line(self) -> str:
-        """Return the problem as one line, without the file's name."""
+    def line(self, name: str | None = None) -> str:
+        """Return the problem as one line, without the file's name; ``name``: see ``item``."""
         text = f"expected {self.expected}; got {self.got}. {self.advice}"
-        return f"{item(self.path)}: {text}" if self.path else text
+        return f"{item(self.path, name)}: {text}" if self.path else text
 
 
 class ProblemError(ValueError):
@@ -66,12 +66,17 @@ class ProblemError(ValueError):
         return cls([Problem((), expected, show(got), advice)])
 
 
-def item(path: Path) -> str:
-    """Return a path as the reader would write it: ``joints[0].type``."""
-    text = ""
-    for part in path:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
-    return text
+def item(path: Path, name: str | None = None) -> str:
+    """Return a path as the reader would write it: ``joints[0] "hinge".type``.
+
+    Args:
+        path: keys and indices.
+        name: of the entry ``path[:2]`` of a list of tables, if it has one.
+    """
+    parts = [f"[{part}]" if isinstance(part, int) else f".{part}" for part in path]
+    if name and isinstance(path[1], int) and path[2:] != ("name",):
+        parts[1] += f" {show(name)}"
+    return "".join(parts).removeprefix(".")
 
 
 def show(value: Any, depth: int = 0) -> str:

@@ -17,11 +17,13 @@ class Source:
         file: what an error starts with.
         shorthand: whether ``providers[0]`` was written as ``[aero]``, or left out.
         overridden: ``--set`` arguments by the path that they set.
+        data: the scenario as plain data, in which the names of entries are looked up.
     """
 
     file: str
     shorthand: bool
     overridden: dict[Path, str]
+    data: dict[str, Any]
 
     def written(self, path: Path) -> Path:
         """Return the path as it stands in the file."""
@@ -36,8 +38,17 @@ class Source:
             shorter = min(len(path), len(overridden))
             if path and path[:shorter] == overridden[:shorter]:
                 origin = f"--set {argument}"
-        text = f"{origin}: {replace(problem, path=self.written(path)).line()}"
+        text = f"{origin}: {replace(problem, path=self.written(path)).line(entry_name(self.data, path))}"
         return " ".join(text.splitlines())
+
+
+def entry_name(data: dict[str, Any], path: Path) -> str | None:
+    """Return the name of the entry of a list of tables that a path leads to or through, if it has one."""
+    try:
+        name = data[str(path[0])][path[1]]["name"]
+    except (LookupError, TypeError):
+        return None
+    return name if isinstance(name, str) else None
 
 
 def expand(data: dict[str, Any], stem: str) -> tuple[dict[str, Any], bool]:
