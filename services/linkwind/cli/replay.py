@@ -99,25 +99,30 @@ def replay(
     from linkwind.runs.replay import Selection
     from linkwind.runs.replay import replay as replay_log
 
-    opened = open_log(log)
+    source = open_log(log)
     chosen = tuple(topic for text in topics or () for topic in text.split(","))
     selection = Selection(start, end, chosen, [_pair(text) for text in remap or ()])
     steering = Steering(rate, loop=loop, paused=paused)
     ends = {"listen": listen or ([] if connect else [default_endpoint(tls)]), "connect": connect or []}
     shown = identity_in(tls, "dynamics")
 
-    def job(progress: Callable[[float], None]) -> Replayed:
-        return replay_log(opened, selection, **ends, identity=shown, progress=progress, steering=steering)
+    def tell() -> None:
+        if not as_json:
+            where = ", ".join([*ends["listen"], *ends["connect"]])
+            typer.echo(f"waiting at {where} for a subscriber of linkwind/v1/{source.run}/**")
 
-    if opened.damage is not None:
-        typer.echo(f"note: the log is not complete: {opened.damage.text}", err=True)
+    def job(progress: Callable[[float], None]) -> Replayed:
+        return replay_log(
+            source, selection, **ends, identity=shown, progress=progress, steering=steering, opened=tell
+        )
+
+    if source.damage is not None:
+        typer.echo(f"note: the log is not complete: {source.damage.text}", err=True)
     if as_json:
         done = job(lambda t: None)
     else:
-        where = ", ".join([*ends["listen"], *ends["connect"]])
-        typer.echo(f"waiting at {where} for a subscriber of linkwind/v1/{opened.run}/**")
         with keys(_actions(steering)):
-            done = _behind_a_bar(opened, selection.start or 0.0, end, job)
+            done = _behind_a_bar(source, selection.start or 0.0, end, job)
     if not done.heard:
         typer.echo("note: at the end nobody listened any more", err=True)
     if as_json:

@@ -123,18 +123,21 @@ def dynamics(
 def meeting(
     scenario: Scenario, listen: list[str] | None, connect: list[str] | None, tls: Path | None, *, quiet: bool
 ) -> Ends:
-    """Return where a dynamics meets its providers; tell how they get there."""
+    """Return where a dynamics meets its providers; once that is open, tell how they get there."""
     from linkwind.credentials import identity_in
     from linkwind.runs.run import Ends
 
     shown = identity_in(tls, "dynamics")
     if not listen and not connect:
         listen = [default_endpoint(tls)]
-    for provider in () if quiet else scenario.providers:
-        where = (listen or connect or [""])[0].replace("0.0.0.0", "THIS-MACHINE")
-        options = f"--connect {where} --name {provider.name}" + (" --tls DIR" if tls else "")
-        typer.echo(f"waiting for {provider.name}: linkwind aero {options}")
-    return Ends(listen or [], connect or [], shown)
+    where = [*(listen or []), *(connect or [])][0].replace("0.0.0.0", "THIS-MACHINE")
+
+    def tell() -> None:
+        for provider in () if quiet else scenario.providers:
+            options = f"--connect {where} --name {provider.name}" + (" --tls DIR" if tls else "")
+            typer.echo(f"waiting for {provider.name}: linkwind aero {options}")
+
+    return Ends(listen or [], connect or [], shown, tell)
 
 
 def tell_plan(found: Plan) -> None:

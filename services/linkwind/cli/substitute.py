@@ -90,9 +90,11 @@ def _answer(log: Log, listen: Sequence[str], connect: Sequence[str], tls: Path |
     """Give the recorded forces to dynamics elsewhere."""
     from linkwind.runs.live_dynamics import answer_dynamics
 
-    if not as_json:
-        typer.echo(f"waiting for a dynamics at {', '.join([*listen, *connect])}")
-    last = answer_dynamics(log, listen, connect, tls)
+    def tell(name: str) -> None:
+        if not as_json:
+            typer.echo(f"{name}: waiting for a dynamics at {', '.join([*listen, *connect])}")
+
+    last = answer_dynamics(log, listen, connect, tls, tell)
     typer.echo(json.dumps({"steps": last}) if as_json else f"answered up to step {last}, the last one")
 
 
@@ -120,11 +122,13 @@ def _provider(
     scenario, files, tables = settled(first, files)
     changes = {step: settled(each, files)[0] for step, each in changes.items()}
     elsewhere = bool(listen or connect)
-    if elsewhere and not as_json:
-        where = ", ".join([*listen, *connect]).replace("0.0.0.0", "THIS-MACHINE")
-        typer.echo(f"waiting for {live}: linkwind aero --connect {where} --name {live}")
     if not elsewhere:
         refuse_missing(scenario, files, [live])
+
+    def tell() -> None:
+        if not as_json:
+            where = ", ".join([*listen, *connect]).replace("0.0.0.0", "THIS-MACHINE")
+            typer.echo(f"waiting for {live}: linkwind aero --connect {where} --name {live}")
 
     def job(progress: Silent) -> Kept[Answered]:
         return live_provider(
@@ -138,6 +142,7 @@ def _provider(
             listen=listen,
             connect=connect,
             tls=tls,
+            opened=tell,
         )
 
     if as_json:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from linkwind.errors import InputError
@@ -24,7 +26,7 @@ def create(name: str, out: Path | None) -> Path:
             out.mkdir(parents=True, exist_ok=True)
             if any(out.iterdir()):
                 raise InputError(
-                    f"{out}: expected a new or empty folder; got one with files. Choose another --out"
+                    f"{out}: expected a new or empty folder; got one with files. Choose another --out."
                 )
             return out
         stem = f"{name}-{time.strftime('%Y%m%d-%H%M%S')}"
@@ -37,9 +39,20 @@ def create(name: str, out: Path | None) -> Path:
             return folder
     except OSError as error:
         raise InputError(
-            f"{error.filename}: cannot create the folder of the run: {error.strerror}"
+            f"{error.filename}: cannot create the folder of the run: {error.strerror}. Choose another --out."
         ) from error
-    raise InputError(f"runs/{stem}: expected a free name; got none in 1000 tries. Choose one with --out")
+    raise InputError(f"runs/{stem}: expected a free name; got none in 1000 tries. Choose one with --out.")
+
+
+@contextmanager
+def removed_if_refused(folder: Path) -> Iterator[None]:
+    """Remove the folder again if the input proves wrong within the block, unless there is something in it."""
+    try:
+        yield
+    except InputError:
+        with suppress(OSError):
+            folder.rmdir()
+        raise
 
 
 def run_id(folder: Path) -> str:

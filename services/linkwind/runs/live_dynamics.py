@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
@@ -41,7 +41,13 @@ def live_dynamics(log: Log, overrides: Sequence[str], out: Path | None, progress
     return drive(service, folder, progress, link, beginning=Beginning(metadata(log, DYNAMICS, changes)))
 
 
-def answer_dynamics(log: Log, listen: Sequence[str], connect: Sequence[str], tls: Path | None = None) -> int:
+def answer_dynamics(
+    log: Log,
+    listen: Sequence[str],
+    connect: Sequence[str],
+    tls: Path | None = None,
+    opened: Callable[[str], None] = lambda name: None,
+) -> int:
     """Take part in a run elsewhere, in the place of every provider, with the forces of a log.
 
     Args:
@@ -49,6 +55,7 @@ def answer_dynamics(log: Log, listen: Sequence[str], connect: Sequence[str], tls
         listen: zenoh endpoints to listen on.
         connect: zenoh endpoints of the dynamics or a router.
         tls: folder with the certificate of each provider; None without TLS.
+        opened: is told the name of each provider whose endpoints are open.
 
     Returns:
         The last step that was answered.
@@ -67,6 +74,7 @@ def answer_dynamics(log: Log, listen: Sequence[str], connect: Sequence[str], tls
         provider = recorded_session(log, name)
         link = ZenohProviderLink(connect, listen, name=name, identity=identity_in(tls, name))
         with closing(link):
+            opened(name)
             serve(link, provider, timeout)
         return provider.at[0]
 

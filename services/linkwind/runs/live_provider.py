@@ -157,6 +157,7 @@ def live_provider(
     listen: Sequence[str] = (),
     connect: Sequence[str] = (),
     tls: Path | None = None,
+    opened: Callable[[], None] = lambda: None,
 ) -> Kept[Answered]:
     """Ask a provider again about the motion of a log, with other settings, another model, another program.
 
@@ -171,6 +172,7 @@ def live_provider(
         listen: zenoh endpoints to listen on, for a provider that comes from elsewhere.
         connect: zenoh endpoints to connect to, likewise; without any, the provider is started here.
         tls: folder with a certificate for each participant here; None without TLS.
+        opened: is called when the endpoints for a provider from elsewhere are open.
 
     Raises:
         InputError: a setting is wrong, or the record does not fit it.
@@ -202,8 +204,9 @@ def live_provider(
         return keep(folder, link, new_log, job)
 
     if listen or connect:
-        return asked(
-            zenoh_link(recorded.session, scenario, listen, connect, identity_in(tls, DYNAMICS)), lambda: None
-        )
+        with folders.removed_if_refused(folder):
+            link = zenoh_link(recorded.session, scenario, listen, connect, identity_in(tls, DYNAMICS))
+        opened()
+        return asked(link, lambda: None)
     with providers_here(recorded.session, scenario, folder, files, tls) as (link, poll):
         return asked(link, poll)

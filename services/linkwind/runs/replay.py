@@ -103,6 +103,7 @@ def replay(
     identity: Identity | None = None,
     progress: Callable[[float], None] = lambda t: None,
     steering: Steering | None = None,
+    opened: Callable[[], None] = lambda: None,
 ) -> Replayed:
     """Wait for a subscriber, then publish.
 
@@ -114,6 +115,7 @@ def replay(
         identity: the dynamics' certificate; None without TLS.
         progress: is told now and then the simulation time [s].
         steering: how it goes on; None for once through at rate 1.
+        opened: is called when the endpoints are open.
 
     Raises:
         InputError: a topic, a time, a key or the rate is wrong, or an endpoint cannot be opened.
@@ -139,6 +141,7 @@ def replay(
         rename=_renaming(log, selection),
     )
     with closing(player):
+        opened()
         if not player.wait(timeout, GRACE):
             raise LostError(
                 f"nobody subscribed to linkwind/v1/{log.run}/** within {timeout:g} s. Start the subscriber, "

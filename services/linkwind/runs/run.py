@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext, suppress
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -16,7 +16,7 @@ from linkwind.dynamics import methods
 from linkwind.dynamics.published import PublishedLog, topics
 from linkwind.dynamics.recorder import MessageLog, Recorder, tables_sha256
 from linkwind.dynamics.service import DynamicsService, Result
-from linkwind.errors import InputError, LostError, ScenarioError
+from linkwind.errors import LostError, ScenarioError
 from linkwind.listening import description
 from linkwind.log.writer import LogWriter
 from linkwind.mechanism import Mechanism, build
@@ -84,11 +84,13 @@ class Ends:
         listen: zenoh endpoints to listen on.
         connect: zenoh endpoints to connect to.
         identity: the dynamics' certificate; None without TLS.
+        opened: is called when these are open.
     """
 
     listen: Sequence[str]
     connect: Sequence[str]
     identity: Identity | None = None
+    opened: Callable[[], None] = lambda: None
 
 
 @dataclass(frozen=True)
@@ -208,17 +210,14 @@ def with_elsewhere(
 ) -> Outcome:
     """Run a service with providers that are started elsewhere; see :func:`dynamics`."""
     scenario = service.scenario
-    try:
+    with folders.removed_if_refused(folder):
         if scenario.bus.transport == "inprocess":
             raise ScenarioError(
                 f'{scenario.source}: bus.transport: expected "zenoh", to meet providers that are started '
                 'elsewhere; got "inprocess". Use: linkwind run'
             )
         link = zenoh_link(service.session, scenario, ends.listen, ends.connect, ends.identity)
-    except InputError:
-        with suppress(OSError):  # there is a log from before
-            folder.rmdir()
-        raise
+    ends.opened()
     return drive(service, folder, progress, link, beginning=beginning, watch=watch, listened=listened)
 
 
