@@ -18,6 +18,14 @@ if TYPE_CHECKING:
 FileArgument = Annotated[Path, typer.Argument(help="The FMU.")]
 
 
+HELP = """Export, check and look into FMUs.
+
+Example: linkwind fmu export two_link -o two_link.fmu && linkwind fmu check two_link.fmu
+
+Example: linkwind fmu info their.fmu
+"""
+
+
 class Fmi(StrEnum):
     """Version of FMI."""
 
@@ -41,7 +49,7 @@ class ArraysChoice(StrEnum):
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    group = typer.Typer(help="Export, check and look into FMUs.", no_args_is_help=True)
+    group = typer.Typer(help=HELP, no_args_is_help=True)
     group.command()(export)
     group.command()(check)
     group.command()(info)

@@ -15,6 +15,14 @@ if TYPE_CHECKING:
     from linkwind.log.reader import Log
 
 
+HELP = """Look into a log, recover or export it.
+
+Example: linkwind log info runs/two_link-20260101-120000
+
+Example: linkwind log export runs/two_link-20260101-120000 -o tables
+"""
+
+
 class Format(StrEnum):
     """Kind of files to export."""
 
@@ -25,7 +33,7 @@ class Format(StrEnum):
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    group = typer.Typer(help="Look into a log, recover or export it.", no_args_is_help=True)
+    group = typer.Typer(help=HELP, no_args_is_help=True)
     group.command()(info)
     group.command()(recover)
     group.command()(export)

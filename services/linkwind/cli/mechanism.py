@@ -15,12 +15,19 @@ from linkwind.errors import InputError
 if TYPE_CHECKING:
     from linkwind.mechanism.remarks import Remark
 
+HELP = """Take mechanisms from URDF and MJCF files, and give URDF.
+
+Example: linkwind mechanism import robot.urdf && linkwind run robot.toml
+
+Example: linkwind mechanism export robot.toml -o robot.urdf
+"""
+
 SHOWN = 4  # names of a group of remarks; the file has all
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    group = typer.Typer(no_args_is_help=True, help="Take mechanisms from URDF and MJCF files, and give URDF.")
+    group = typer.Typer(no_args_is_help=True, help=HELP)
     group.command("import")(import_)
     group.command()(export)
     app.add_typer(group, name="mechanism")

@@ -14,6 +14,11 @@ from linkwind.errors import InputError
 if TYPE_CHECKING:
     from linkwind.runs.validate import Plot, Row, Suite
 
+HELP = """Compare a model with published and exact values.
+
+Example: linkwind validate multibody --short --out validation
+"""
+
 CaseOption = Annotated[
     list[str] | None, typer.Option("--case", metavar="NAME", help="Only this case; repeatable.")
 ]
@@ -21,7 +26,7 @@ CaseOption = Annotated[
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    group = typer.Typer(no_args_is_help=True, help="Compare a model with published and exact values.")
+    group = typer.Typer(no_args_is_help=True, help=HELP)
     group.command()(flow)
     group.command()(multibody)
     group.command()(coupling)
