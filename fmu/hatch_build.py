@@ -53,16 +53,17 @@ def run_compiler(*arguments: object, cwd: Path) -> None:
 
 
 def compile_library(root: Path, target: Path) -> None:
-    """Compile ``fmu/core``, ``fmu/baselines``, ``fmu/aero`` and ``fmu/flow`` into one shared library.
+    """Compile the folders of ``fmu`` that the Python side calls into one shared library.
 
     The lattice is for vectors, which gcc makes of plain loops at -O3 only.
     """
     source = root / "fmu"
-    includes = [f"-I{source / folder}" for folder in ("core", "baselines", "aero", "flow")]
+    folders = ("core", "baselines", "aero", "coupling")
+    includes = [f"-I{source / folder}" for folder in (*folders, "flow")]
     partial = target.with_name(target.name + ".partial")
     with tempfile.TemporaryDirectory() as folder:
         objects = Path(folder)
-        exact = sorted(f for folder in ("core", "baselines", "aero") for f in (source / folder).glob("*.c"))
+        exact = sorted(file for folder in folders for file in (source / folder).glob("*.c"))
         run_compiler(*includes, "-c", *exact, cwd=objects)
         run_compiler(*includes, "-O3", "-c", *sorted((source / "flow").glob("*.c")), cwd=objects)
         run_compiler("-shared", "-o", partial, *sorted(objects.glob("*.o")), "-lm", cwd=objects)

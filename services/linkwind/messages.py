@@ -34,25 +34,26 @@ class _Message:
     Attributes:
         at: which exchange it belongs to: index of the communication point, coupling iteration.
         time_ns: simulation time of the communication point [ns].
+        layout: the message itself.
     """
 
-    __slots__ = ("_layout", "_name", "_stamp_at", "_tags", "at", "time_ns")
+    __slots__ = ("_name", "_stamp_at", "_tags", "at", "layout", "time_ns")
 
     def __init__(self, name: str, **fields: object) -> None:
         self._name = name
-        self._layout = FixedLayout(MESSAGES[name](**fields))
-        self._stamp_at = self._layout.regions["step"].offset
-        _, first, _, second, _ = _STAMP.unpack_from(self._layout.buffer, self._stamp_at)
+        self.layout = FixedLayout(MESSAGES[name](**fields))
+        self._stamp_at = self.layout.regions["step"].offset
+        _, first, _, second, _ = _STAMP.unpack_from(self.layout.buffer, self._stamp_at)
         self._tags = first, second
         self._read_stamp()
 
     def _read_stamp(self) -> None:
-        step, _, iteration, _, self.time_ns = _STAMP.unpack_from(self._layout.buffer, self._stamp_at)
+        step, _, iteration, _, self.time_ns = _STAMP.unpack_from(self.layout.buffer, self._stamp_at)
         self.at: tuple[int, int] = step, iteration
 
     def payload(self) -> bytes:
         """Return the encoded message."""
-        return self._layout.payload()
+        return self.layout.payload()
 
     def load(self, payload: bytes, what: str) -> None:
         """Decode ``payload`` into the arrays.
@@ -64,24 +65,24 @@ class _Message:
         Raises:
             ProtocolError: it is not such a message, or is of another run, sender or size.
         """
-        if self._layout.load(payload):
+        if self.layout.load(payload):
             self._read_stamp()
             return
         try:
             message = MESSAGES[self._name].FromString(payload)
-            self._layout.fill(message)
+            self.layout.fill(message)
             self._read_stamp()
         except (DecodeError, ValueError) as error:
             raise ProtocolError(f"{what}: expected a {self._name} of this run; got {error}") from error
 
     def fits(self, other: _Message) -> bool:
         """Tell whether another message has the same layout."""
-        return self._layout.fits(other._layout)
+        return self.layout.fits(other.layout)
 
     def stamp(self, step: int, iteration: int, time_ns: int) -> None:
         """Set which exchange this message belongs to."""
         first, second = self._tags
-        _STAMP.pack_into(self._layout.buffer, self._stamp_at, step, first, iteration, second, time_ns)
+        _STAMP.pack_into(self.layout.buffer, self._stamp_at, step, first, iteration, second, time_ns)
         self.at, self.time_ns = (step, iteration), time_ns
 
 
@@ -111,17 +112,17 @@ class MotionMessage(_Message):
             accepted=motion(),
             trial=motion(),
         )
-        self.accepted = Motion.of(self._layout.views, "accepted")
-        self.trial = Motion.of(self._layout.views, "trial")
+        self.accepted = Motion.of(self.layout.views, "accepted")
+        self.trial = Motion.of(self.layout.views, "trial")
 
     @property
     def final(self) -> bool:
         """Whether the run is over: ``accepted`` is the last state, nothing is to be evaluated."""
-        return bool(self._layout.views["final"][0])
+        return bool(self.layout.views["final"][0])
 
     @final.setter
     def final(self, value: bool) -> None:
-        self._layout.views["final"][0] = int(value)
+        self.layout.views["final"][0] = int(value)
 
 
 class WrenchMessage(_Message):
@@ -158,7 +159,7 @@ class WrenchMessage(_Message):
             response=_zeros(response_size),
             diagnostics=_zeros(len(diagnostics)),
         )
-        views = self._layout.views
+        views = self.layout.views
         coupled = response_size == 36 * n * n
         self.wrench = Wrench(
             views["force"].reshape(n, 3),

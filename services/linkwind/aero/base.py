@@ -38,6 +38,9 @@ class ForceModel(Protocol):
     The motion always holds all bodies of the scenario, the wrench those of the provider, both in the
     order of the scenario and of the provider.
 
+    A model whose arithmetic is in ``fmu/aero`` has it as ``forces`` (:mod:`linkwind.native.forces`), which
+    is None for no force at all.
+
     A model may have two methods more. ``frame() -> FlowFrame | None`` is called after each ``evaluate`` and
     after the last ``commit``, and returns the picture of its fluid that is due (:mod:`linkwind.frames`), each
     once. ``close()`` ends what the model holds, such as a process of its own.

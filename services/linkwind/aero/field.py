@@ -80,12 +80,12 @@ class ForceField:
     capabilities = Capabilities()
 
     def __init__(self, scenario: Scenario, provider: Provider) -> None:
-        self._field = Field(field_table(scenario, provider), initial_angles(scenario, provider))
+        self.forces = Field(field_table(scenario, provider), initial_angles(scenario, provider))
         self._items = [item(scenario, provider, "field", name) for name in provider.bodies]
 
     def commit(self, t: float, motion: Motion) -> None:
         """Unwrap angles against this state from now on."""
-        self._field.commit(motion)
+        self.forces.commit(motion)
 
     def evaluate(self, t: float, motion: Motion, wrench: Wrench) -> None:
         """Write the values of the expressions for the state at time t [s].
@@ -93,7 +93,7 @@ class ForceField:
         Raises:
             SimulationError: a value is not finite.
         """
-        status = self._field.evaluate(t, motion, wrench)
+        status = self.forces.evaluate(t, motion, wrench)
         if status:
             raise self._not_finite(*divmod(status - 1, 6), t, motion, wrench)
 
@@ -101,7 +101,7 @@ class ForceField:
         self, i: int, component: int, t: float, motion: Motion, wrench: Wrench
     ) -> SimulationError:
         value = (*wrench.force[i], *wrench.torque[i])[component]
-        variables = self._field.variables(i, t, motion).items()
+        variables = self.forces.variables(i, t, motion).items()
         state = ", ".join(f"{name} = {x:.9g}" for name, x in variables if name != "t")
         return SimulationError(
             f"{self._items[i]}.{COMPONENTS[component]}: expected a finite number at t = {t:.9g} s; got "
@@ -110,7 +110,7 @@ class ForceField:
 
     def save(self) -> bytes:
         """Return the angles of the last accepted state, as little-endian float64."""
-        return self._field.theta.astype("<f8").tobytes()
+        return self.forces.theta.astype("<f8").tobytes()
 
     def restore(self, blob: bytes) -> None:
         """Take back the angles that ``save`` returned.
@@ -118,7 +118,7 @@ class ForceField:
         Raises:
             ProtocolError: the blob has another size.
         """
-        theta = self._field.theta
+        theta = self.forces.theta
         if len(blob) != theta.nbytes:
             raise ProtocolError(
                 f"model field: expected a checkpoint of {theta.nbytes} bytes; got {len(blob)}."

@@ -12,6 +12,7 @@ class Vacuum:
     """The force model of a mechanism without a fluid."""
 
     capabilities = Capabilities()
+    forces = None
 
     def __init__(self, scenario: Scenario, provider: Provider) -> None:
         pass

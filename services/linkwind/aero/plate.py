@@ -56,7 +56,7 @@ class Plate:
     capabilities = Capabilities(added_inertia=True)
 
     def __init__(self, scenario: Scenario, provider: Provider) -> None:
-        self._plates = Plates(plate_table(scenario, provider))
+        self.forces = Plates(plate_table(scenario, provider))
         self._file, self._bodies = f"{scenario.source}", provider.bodies
 
     def commit(self, t: float, motion: Motion) -> None:
@@ -68,12 +68,12 @@ class Plate:
         Raises:
             SimulationError: a wrench is not finite.
         """
-        status = self._plates.evaluate(t, motion, wrench)
+        status = self.forces.evaluate(t, motion, wrench)
         if status:
             raise self._not_finite(status - 1, t, motion)
 
     def _not_finite(self, plate: int, t: float, motion: Motion) -> SimulationError:
-        body = self._plates.table.body[plate]
+        body = self.forces.table.body[plate]
         parts = (motion.position, motion.orientation, motion.linear, motion.angular)
         names = ("position", "orientation", "velocity", "angular velocity")
         state = ", ".join(f"{name} {part[body].tolist()}" for name, part in zip(names, parts, strict=True))

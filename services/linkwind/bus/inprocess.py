@@ -10,7 +10,11 @@ from linkwind.protocol import DynamicsSession, ProviderSession, fault_error
 
 
 class InProcessLink:
-    """The dynamics' end of a bus whose providers live in the same thread."""
+    """The dynamics' end of a bus whose providers live in the same thread.
+
+    Attributes:
+        providers: in the scenario's order.
+    """
 
     def __init__(self, session: DynamicsSession, providers: Sequence[ProviderSession]) -> None:
         """Shake hands with every provider.
@@ -19,13 +23,13 @@ class InProcessLink:
             LinkwindError: a provider is refused or cannot build its model.
         """
         self._session = session
-        self._providers = list(providers)
+        self.providers = list(providers)
         self._answers: deque[tuple[str, bytes]] = deque()
         self._frames: list[tuple[str, bytes]] = []
         self._checkpoints: list[tuple[str, bytes]] = []
         self._trouble: FaultError | None = None
         try:
-            for provider in self._providers:
+            for provider in self.providers:
                 provider.welcome(session.control(provider.hello()))
                 provider.build()
                 provider.started(session.control(provider.ready()))
@@ -41,7 +45,7 @@ class InProcessLink:
 
     def post(self, motion: bytes) -> None:
         """Let every provider answer; a failure is heard when the answers are awaited, as over a network."""
-        for provider in self._providers:
+        for provider in self.providers:
             try:
                 answer = provider.answer(motion)
             except LinkwindError as error:
@@ -86,5 +90,5 @@ class InProcessLink:
 
     def close(self) -> None:
         """Let every provider end what it holds."""
-        for provider in self._providers:
+        for provider in self.providers:
             provider.close()

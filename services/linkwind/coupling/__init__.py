@@ -17,6 +17,8 @@ from __future__ import annotations
 
 from linkwind.coupling import explicit, implicit, pec
 from linkwind.coupling.base import Answer, CommunicationPoint, Exchange, Met, Plant, Scheme, Settings, State
+from linkwind.coupling.degree import DegreeControl
+from linkwind.coupling.history import History
 
 SCHEMES: dict[str, Scheme] = {"explicit": explicit.run, "pec": pec.run, "implicit": implicit.run}
 
@@ -24,7 +26,9 @@ __all__ = [
     "SCHEMES",
     "Answer",
     "CommunicationPoint",
+    "DegreeControl",
     "Exchange",
+    "History",
     "Met",
     "Plant",
     "Scheme",

@@ -10,10 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from linkwind.coupling.degree import DegreeControl
+    from linkwind.coupling.history import History
 
 Array = NDArray[np.float64]
 State = Any  # the plant's own; a scheme stores it and hands it back, never looks inside, never changes it
@@ -140,6 +144,26 @@ class CommunicationPoint(NamedTuple):
     iterations: int
 
 
+class March(Protocol):
+    """What can take regular steps of `pec` in the place of the scheme, many at once."""
+
+    def __call__(
+        self, step: int, accepted: State, history: History, degree: DegreeControl
+    ) -> tuple[int, State]:
+        """Take no, one or many steps from ``step`` on, but not the last one.
+
+        Args:
+            step: the next one.
+            accepted: the state before it.
+            history: is brought up to date.
+            degree: likewise.
+
+        Returns:
+            The first step that was not taken, and the accepted state before it.
+        """
+        ...
+
+
 @dataclass(frozen=True)
 class Settings:
     """Settings of a coupling scheme; each scheme reads its own.
@@ -154,6 +178,7 @@ class Settings:
         acceleration: of the coupling iterations (implicit), a name in `acceleration`.
         tolerance: by which guess and answer may differ, relative, weighted.
         iterations: most exchanges in a step.
+        march: takes steps, of which no points are yielded; `pec` only. None for nothing.
     """
 
     weight: Array
@@ -163,6 +188,7 @@ class Settings:
     acceleration: str = "iqn_ils"
     tolerance: float = 1e-8
     iterations: int = 50
+    march: March | None = None
 
     def __post_init__(self) -> None:
         weight = np.array(self.weight, dtype=np.float64)

@@ -37,34 +37,44 @@ class DegreeControl:
     Attributes:
         next: degree of the next prediction.
         errors: E_d by degree, p+1 weighted wrenches squared; NaN where not measured yet.
+        differences: row j holds the backward difference of order j, by weight, shape (p+2, 6n).
+        weight: of the wrenches, shape (n, 6).
+        adaptive: whether the degree may be lower than p.
     """
 
     def __init__(self, weight: Array, order: int, *, adaptive: bool) -> None:
         self.next = 0
         self.errors = (nan,) * (order + 1)
-        self._weight = weight
+        self.weight = weight
+        self.adaptive = adaptive
         self._order = order
-        self._adaptive = adaptive
         self._answers = 0
-        # Row j holds the backward difference of order j, by weight. Differences and plain sums, no matrix
-        # product: that differs in the last bit from one processor to another, and here a bit may decide.
-        self._table = np.zeros((order + 2, weight.size))
-        self._newest = self._table[0].reshape(weight.shape)
-        self._front, self._back = self._table[:-1], self._table[1:]
-        self._squares = np.zeros((order + 1, weight.size))
+        # Differences, and sums from the first number to the last, no matrix product: that differs in the last
+        # bit from one processor to another, and here a bit may decide.
+        self.differences = np.zeros((order + 2, weight.size))
+        self._newest = self.differences[0].reshape(weight.shape)
+        self._front, self._back = self.differences[:-1], self.differences[1:]
+        self._sums = np.zeros((order + 1, weight.size))
+
+    @property
+    def settled(self) -> bool:
+        """Whether every degree has been measured often enough for all steps from here on to be alike."""
+        return self._answers > self._order + 1
 
     def add(self, wrench: Array) -> None:
         """Take the new wrench, shape (n, 6), and choose the next degree."""
         self._back[...] = self._front
-        np.multiply(wrench, self._weight, self._newest)
-        np.subtract.accumulate(self._table, 0, None, self._table)  # ∇^j new = ∇^{j−1} new − ∇^{j−1} old
-        np.square(self._back, self._squares)
-        missed = np.add.reduce(self._squares, 1).tolist()
-        if self._answers > self._order + 1:
+        np.multiply(wrench, self.weight, self._newest)
+        table = self.differences
+        np.subtract.accumulate(table, 0, None, table)  # ∇^j new = ∇^{j−1} new − ∇^{j−1} old
+        np.square(self._back, self._sums)
+        np.add.accumulate(self._sums, 1, None, self._sums)
+        missed = self._sums[:, -1].tolist()
+        if self.settled:
             self.errors = tuple(
                 [MEMORY * old + (1.0 - MEMORY) * e for old, e in zip(self.errors, missed, strict=True)]
             )
-            if self._adaptive:
+            if self.adaptive:
                 self.next = self.errors.index(min(self.errors))
         else:
             self._first(missed)
@@ -79,7 +89,7 @@ class DegreeControl:
         ]
         self.errors = (*known, *self.errors[measured:])
         self.next = min(measured, self._order)
-        if self._adaptive and known:
+        if self.adaptive and known:
             best = known.index(min(known))
             if best < measured - 1 or measured > self._order:
                 self.next = best

@@ -37,6 +37,11 @@ class History:
         self.behind = [(0.0 - count, block) for count, block in blocks]
         self.through = [(1.0 - count, block) for count, block in blocks]
 
+    @property
+    def full(self) -> bool:
+        """Whether there are as many answers as it keeps."""
+        return self.count == len(self.wrenches)
+
     def add(self, step: int, answer: Answer) -> None:
         """Keep a copy of the answer for communication point ``step``."""
         self.shift()
@@ -45,7 +50,7 @@ class History:
     def shift(self) -> None:
         """Move all wrenches down by one; the newest keeps its value until it is written."""
         self._older[...] = self._newer
-        if self.count < len(self.wrenches):
+        if not self.full:
             self.count += 1
 
     def replace(self, step: int, answer: Answer) -> None:

@@ -50,7 +50,10 @@ def run(
     points, degree = start(plant, exchange, initial, steps, settings, history)
     yield from points
     accepted, newest = points[-1].state, history.wrenches[0]
-    for step in range(len(points), steps + 1):
+    step = len(points)
+    while step <= steps:
+        if settings.march is not None:
+            step, accepted = settings.march(step, accepted, history, degree)
         d = degree.next
         if stiffness(plant, accepted, history, weight) > EXPLICIT:
             d, trial = 0, predict(plant, history, accepted, plant.twist(accepted))
@@ -64,3 +67,4 @@ def run(
         yield CommunicationPoint(
             step, accepted, trial, newest.copy(), history.added_inertia, d, degree.errors, 1
         )
+        step += 1

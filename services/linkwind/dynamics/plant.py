@@ -33,7 +33,13 @@ class State(NamedTuple):
 
 
 class MechanismPlant:
-    """A mechanism with its integrator (:class:`linkwind.coupling.Plant`)."""
+    """A mechanism with its integrator (:class:`linkwind.coupling.Plant`).
+
+    Attributes:
+        initial: the state at t_0.
+        multibody: the mechanism.
+        orders: communication points after which events, by number, happen at once.
+    """
 
     def __init__(self, mechanism: Mechanism, scenario: Scenario, where: Callable[[], str]) -> None:
         """Make the plant of ``scenario``; ``where`` tells the step and time of an error."""
@@ -43,17 +49,17 @@ class MechanismPlant:
         self.change(mechanism, scenario)
         self.initial = State(0, self.multibody.initial_state(mechanism.q0, mechanism.v0), 0.0, 0.0)
         self._motion = Motion.at_rest(self.multibody.n)
-        self._orders: dict[int, int] = {}
+        self.orders: dict[int, int] = {}
 
     def order(self, event: int, step: int) -> None:
         """Let an event, by its number, happen at the start behind communication point ``step``."""
-        self._orders.setdefault(event, step)
+        self.orders.setdefault(event, step)
 
     def _begin(self, state: State) -> Array:
         """Return the values to advance from: those of the state, with what is ordered for it."""
-        if not self._orders:
+        if not self.orders:
             return state.values
-        due = [event for event, step in self._orders.items() if step == state.step]
+        due = [event for event, step in self.orders.items() if step == state.step]
         if not due:
             return state.values
         values = state.values.copy()

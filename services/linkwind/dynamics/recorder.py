@@ -40,6 +40,8 @@ class Recorder:
         log: to write to.
         joint_gap_max: largest distance of two joint points so far, from the poses [m].
         force_max: largest aerodynamic force on a body so far [N].
+        state: the message of accepted points.
+        accepted: what evaluates them into it.
     """
 
     def __init__(
@@ -49,7 +51,7 @@ class Recorder:
         self.force_max = 0.0
         self.log = log
         self._step_ns = scenario.coupling.step_ns
-        self._state = StateMessage(
+        self.state = StateMessage(
             multibody.n,
             len(mechanism.q0),
             len(mechanism.v0),
@@ -62,15 +64,15 @@ class Recorder:
 
     def use(self, multibody: Multibody) -> None:
         """Evaluate points by this from now on."""
-        self._accepted = AcceptedPoint(multibody, self._state.motion, self._state.fields)
+        self.accepted = AcceptedPoint(multibody, self.state.motion, self.state.fields)
 
     def point(self, point: CommunicationPoint) -> None:
         """Write an accepted communication point and what the coupling did to get there."""
         state, time_ns = point.state, point.step * self._step_ns
-        found = self._accepted.evaluate(
+        found = self.accepted.evaluate(
             state.values, point.trial.values, point.wrench, point.added_inertia, time_ns / 1e9
         )
-        payload = self._state.encode(
+        payload = self.state.encode(
             point.step,
             time_ns,
             kinetic_energy=found.kinetic_energy,
@@ -90,7 +92,7 @@ class Recorder:
             interface_energy=found.lost * self._step_ns / 1e9,
         )
         self.log.step(payload, time_ns)
-        self.log.scene(time_ns, self._state.motion, self._accepted.force)
+        self.log.scene(time_ns, self.state.motion, self.accepted.force)
         self.joint_gap_max = max(self.joint_gap_max, found.joint_gap)
         self.force_max = max(self.force_max, found.force)
 

@@ -12,8 +12,9 @@ from types import MappingProxyType
 import numpy as np
 
 from linkwind.bus.base import DynamicsLink
-from linkwind.coupling import SCHEMES, Answer, CommunicationPoint, Settings
+from linkwind.coupling import SCHEMES, Answer, CommunicationPoint, DegreeControl, History, Settings
 from linkwind.dynamics.exchanges import Exchanges
+from linkwind.dynamics.march import RecordedMarch
 from linkwind.dynamics.plant import MechanismPlant, State, acceleration_weight
 from linkwind.dynamics.recorder import Recorder
 from linkwind.dynamics.recovery import Patience, Return
@@ -63,6 +64,7 @@ class DynamicsService:
         hold: is called before a step with its number, and may wait; what else it is given writes to the log
             what has been accepted. None for nothing.
         returned: is told of each provider that was lost and came back.
+        march: takes steps of which there is a record. None for nothing.
     """
 
     def __init__(
@@ -87,6 +89,7 @@ class DynamicsService:
         self.live_from = 0
         self.hold: Callable[[int, Callable[[], None]], None] | None = None
         self.returned: Callable[[Return], None] = lambda back: None
+        self.march: RecordedMarch | None = None
         self.session = DynamicsSession(
             run=run,
             scenario_json=scenario.to_json(),
@@ -167,6 +170,7 @@ class DynamicsService:
             acceleration=scenario.coupling.acceleration,
             tolerance=scenario.coupling.tolerance,
             iterations=scenario.coupling.iterations,
+            march=self._go_ahead if self.march else None,
         )
         scheme = SCHEMES[scenario.coupling.scheme]
         if scenario.coupling.scheme == "implicit" and self.session.cannot_go_back:
@@ -175,18 +179,39 @@ class DynamicsService:
                 f"{scenario.source}: coupling.scheme: implicit: expected providers that can go back to the "
                 f"start of a step; got {names}, which cannot. Use pec."
             )
-        stride = max(1, self._steps // 200)
+        stride, due = max(1, self._steps // 200), 0
         state = self._plant.initial
         for point in scheme(self._plant, self._exchange, state, self._steps, settings):
             self._pending.append(point)  # written while the next answer is awaited
             state = point.state
-            if point.step % stride == 0:
+            if point.step >= due:
                 progress(point.step)
+                due = point.step + stride
             while self.session.ordered:
                 self._order({self.session.ordered.pop(0): self.session.motion.at[0]})
             if point.step in self._changes:
                 self._change(point.step, *self._changes[point.step])
         return state
+
+    def _go_ahead(
+        self, step: int, accepted: State, history: History, degree: DegreeControl
+    ) -> tuple[int, State]:
+        """Take the recorded steps from ``step`` on; see :class:`linkwind.coupling.base.March`."""
+        assert self.march is not None
+        self._write_pending()
+        place = accepted, history, degree
+        last = self.march.go(self.session, self._plant, self._recorder, self._alike(step), *place)
+        self._exchanged += last.step - accepted.step
+        return last.step + 1, last
+
+    def _alike(self, step: int) -> int:
+        """Return how many steps from this one on neither are the last nor save, change or order anything."""
+        every = self.session.course.checkpoint_every
+        others = [self._steps, *(order + 1 for order in self._plant.orders.values())]
+        others += [special for changed in self._changes for special in (changed, changed + 1)]
+        if every:
+            others.append(-(-(step - 1) // every) * every + 1)
+        return min(other for other in others if other >= step) - step
 
     def _order(self, orders: Mapping[str, int]) -> None:
         for event, step in orders.items():

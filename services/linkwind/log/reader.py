@@ -28,6 +28,8 @@ from linkwind.log.head import Head, check_magic
 from linkwind.log.scan import scan
 from linkwind.schema import MESSAGES
 
+CHUNKS_KEPT = 8  # in memory, for topics that are read side by side but not in step
+
 
 class Log(Head):
     """One log file, open for reading; made by :func:`open_log`.
@@ -39,7 +41,7 @@ class Log(Head):
 
     def __init__(self, path: Path, data: Data) -> None:
         self._data = data
-        self._sorted: tuple[Span, dict[int | None, list[Message]]] | None = None  # the last chunk's messages
+        self._sorted: dict[Span, dict[int | None, list[Message]]] = {}  # messages of the last chunks
         super().__init__(path, scan(data))
         self.channels: dict[int, ChannelInfo] = dict(self._contents.channels)
         counts = self._counts()
@@ -83,9 +85,11 @@ class Log(Head):
         """Iterate like :meth:`messages` over one topic; several such side by side read the file only once."""
         channel = next((n for n, channel in self.channels.items() if channel.topic == topic), None)
         for chunk in self._contents.chunks:
-            if self._sorted is None or self._sorted[0] != chunk:
-                self._sorted = chunk, self._by_channel(chunk)
-            yield from self._sorted[1].get(channel, ())
+            if chunk not in self._sorted:
+                if len(self._sorted) == CHUNKS_KEPT:
+                    del self._sorted[next(iter(self._sorted))]
+                self._sorted[chunk] = self._by_channel(chunk)
+            yield from self._sorted[chunk].get(channel, ())
 
     def _by_channel(self, chunk: Span) -> dict[int | None, list[Message]]:
         found: dict[int | None, list[Message]] = {}

@@ -26,6 +26,7 @@ class StateMessage:
     Attributes:
         motion: accepted poses and twists, in W at the centres of mass.
         fields: the other arrays, flat, by name.
+        layout: the message itself.
     """
 
     def __init__(self, n: int, nq: int, nv: int, closures: int = 0, events: int = 0, forces: int = 0) -> None:
@@ -49,8 +50,8 @@ class StateMessage:
         }  # fmt: skip
         scalars = ("kinetic_energy", "potential_energy", "external_work", "dissipated_work", "joint_gap")
         zeros = dict.fromkeys(scalars, 0.0)
-        self._layout = FixedLayout(MESSAGES["State"](step=0, time_ns=0, motion=motion, **arrays, **zeros))
-        views, regions = self._layout.views, self._layout.regions
+        self.layout = FixedLayout(MESSAGES["State"](step=0, time_ns=0, motion=motion, **arrays, **zeros))
+        views, regions = self.layout.views, self.layout.regions
         self.motion = Motion.of(views, "motion")
         self.fields = {name: views[name] for name in arrays}
         self._stamp_at, self._energies_at = regions["step"].offset, regions["kinetic_energy"].offset
@@ -77,7 +78,7 @@ class StateMessage:
             dissipated_work: taken by joint dampers since t_0 [J].
             joint_gap: largest distance of two joint points, from the poses [m].
         """
-        buffer = self._layout.buffer
+        buffer = self.layout.buffer
         _STAMP.pack_into(buffer, self._stamp_at, step, 0x11, time_ns)
         _ENERGIES.pack_into(
             buffer, self._energies_at, kinetic_energy,
@@ -128,6 +129,12 @@ class StepEncoder:
             0x09, step, 0x11, time_ns, 0x1D, iteration, 0x25, order, 0x2A, self._length, *errors,
             0x31, residual, 0x39, interface_energy,
         )  # fmt: skip
+
+
+def step_layout(order: int) -> FixedLayout:
+    """Return the message of :class:`StepEncoder` with a place for every number, for the native library."""
+    fields = {"iteration": 0, "order": 0, "extrapolation_error": [0.0] * (order + 1)}
+    return FixedLayout(MESSAGES["Step"](step=0, time_ns=0, residual=0.0, interface_energy=0.0, **fields))
 
 
 class TimingEncoder:

@@ -183,7 +183,11 @@ def wind_at(wind: WindTable, t: float, r: Array, v: Array) -> tuple[Array, Array
 
 
 class Plates:
-    """Quasi-steady flat plates."""
+    """Quasi-steady flat plates.
+
+    Attributes:
+        at: address of the ``lw_plates``.
+    """
 
     def __init__(self, table: PlateTable) -> None:
         self.table = table
@@ -196,7 +200,7 @@ class Plates:
             table.density,
             _wind_struct(table.wind),
         )
-        self._at = ctypes.addressof(self._struct)
+        self.at = ctypes.addressof(self._struct)
         arguments = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p]
         self._evaluate = declare("lw_plates_evaluate", arguments)
         self._motion, self._wrench = _Bound(_Pointers4), _Bound(_Pointers3)
@@ -212,7 +216,7 @@ class Plates:
         Returns:
             0, or 1 + the index of the first plate whose wrench is not finite.
         """
-        return self._evaluate(self._at, t, self._motion.at(motion), self._wrench.at(wrench))  # type: ignore[no-any-return]
+        return self._evaluate(self.at, t, self._motion.at(motion), self._wrench.at(wrench))  # type: ignore[no-any-return]
 
 
 class Field:
@@ -221,6 +225,7 @@ class Field:
     Attributes:
         theta: angle about world z of each body's x axis at the last accepted state [rad], unwrapped,
             shape (n,); it is the field's only memory.
+        at: address of the ``lw_field``.
     """
 
     def __init__(self, table: FieldTable, theta: Array) -> None:
@@ -229,7 +234,7 @@ class Field:
         self._arrays = [_indices(array) for array in (table.body, table.start, table.code)]
         constants = address(table.constants) if len(table.constants) else None
         self._struct = _Field(len(table.body), *map(_index_address, self._arrays), constants)
-        self._at, self._theta_at = ctypes.addressof(self._struct), address(theta)
+        self.at, self._theta_at = ctypes.addressof(self._struct), address(theta)
         pointer = ctypes.c_void_p
         self._commit: Any = declare("lw_field_commit", [pointer, pointer, pointer], None)
         self._evaluate = declare("lw_field_evaluate", [pointer, ctypes.c_double, pointer, pointer, pointer])
@@ -237,7 +242,7 @@ class Field:
 
     def commit(self, motion: Motion) -> None:
         """Take the angles of an accepted state as those to unwrap against."""
-        self._commit(self._at, self._accepted.at(motion), self._theta_at)
+        self._commit(self.at, self._accepted.at(motion), self._theta_at)
 
     def evaluate(self, t: float, motion: Motion, wrench: Wrench) -> int:
         """Write force and torque on every body.
@@ -251,7 +256,7 @@ class Field:
             0, or 1 + 6 i + c where component c of body i is the first that is not finite.
         """
         return self._evaluate(  # type: ignore[no-any-return]
-            self._at, t, self._motion.at(motion), self._theta_at, self._wrench.at(wrench)
+            self.at, t, self._motion.at(motion), self._theta_at, self._wrench.at(wrench)
         )
 
     def variables(self, i: int, t: float, motion: Motion) -> dict[str, float]:
@@ -260,5 +265,5 @@ class Field:
         arguments = [pointer, ctypes.c_int, ctypes.c_double, pointer, pointer, pointer]
         values = np.zeros(len(VARIABLES))
         function = declare("lw_field_variables", arguments, None)
-        function(self._at, i, t, self._motion.at(motion), self._theta_at, address(values))
+        function(self.at, i, t, self._motion.at(motion), self._theta_at, address(values))
         return dict(zip(VARIABLES, values.tolist(), strict=True))

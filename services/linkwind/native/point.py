@@ -47,6 +47,7 @@ class AcceptedPoint:
 
     Attributes:
         force: the last one's total on every body [N], shape (n, 3), in W.
+        at: address of the ``lw_point``.
     """
 
     def __init__(self, multibody: Multibody, motion: Motion, fields: Mapping[str, Array]) -> None:
@@ -68,7 +69,7 @@ class AcceptedPoint:
         self.force = results.total_wrench[:, :3]
         self._added_at = address(self._added)
         self._struct = ctypes.create_string_buffer(_layout.size)
-        self._struct_at = ctypes.addressof(self._struct)
+        self.at = ctypes.addressof(self._struct)
         _layout.pack_into(
             self._struct, 0, address(self._state), address(self._trial), 0.0, address(self._wrench), 0,
             *map(address, results), address(self._difference), multibody.closures, *motion.addresses,
@@ -99,6 +100,6 @@ class AcceptedPoint:
             added_at = self._added_at
         struct.pack_into("@d", self._struct, _TIME, time)
         struct.pack_into("@P", self._struct, _ADDED, added_at)
-        if status := _point(self._multibody._model, self._struct_at):
+        if status := _point(self._multibody._model, self.at):
             fail(status, self._multibody._fault, self._multibody._names, {})
         return Measures._make(self._measures.tolist())

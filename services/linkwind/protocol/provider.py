@@ -7,6 +7,7 @@ import logging
 import uuid
 from collections.abc import Callable
 from enum import Enum, auto
+from typing import Any
 
 from linkwind import __version__
 from linkwind.errors import ProtocolError, RefusedError
@@ -120,6 +121,15 @@ class ProviderSession:
     def _use(self, model: Model) -> None:
         self._model = model
         self._frame: Callable[[], FlowFrame | None] = getattr(model, "frame", lambda: None)
+
+    @property
+    def model(self) -> Any:
+        """The force model that counts now."""
+        return self._model
+
+    def passed(self, steps: int) -> None:
+        """Take so many steps as committed and answered: somebody else has done that with the model."""
+        self.at = (self.at[0] + steps, 0)
 
     def ready(self) -> bytes:
         """Return the message that says that motion can come."""

@@ -10,6 +10,7 @@ from linkwind.log.contents import FLOW, MOTION, STATE, STEP, WRENCH
 from linkwind.log.difference import Difference, Finder, between_frames
 from linkwind.log.reader import Log
 from linkwind.mechanism import Mechanism
+from linkwind.native.march import Recording
 from linkwind.runs.recorded import DifferError, LogEndsError, Recorded
 from linkwind.scenario import Scenario
 from linkwind.spatial import Array, Motion
@@ -58,6 +59,23 @@ class Comparison:
 
     def diagnostics(self, names: Mapping[str, Sequence[str]]) -> None:
         """Names follow from the scenario and the program."""
+
+    def ahead(self, step: int, count: int) -> Recording:
+        """Return what the messages of steps have to be; see :class:`linkwind.dynamics.march.Record`."""
+        time_ns, topics = step * self._step_ns, [MOTION, *self._wrenches.values(), STATE, STEP]
+        found = [self._recorded[topic].ahead(count, time_ns, self._step_ns) for topic in topics]
+        least = min(map(len, found))
+        motion, *wrenches, state, at_end = (payloads[:least] for payloads in found)
+        return Recording(motion, wrenches, state, at_end)
+
+    def passed(self, step: int, count: int) -> None:
+        """Take messages as compared; see :class:`linkwind.dynamics.march.Record`."""
+        topics = [MOTION, *self._wrenches.values(), STATE, STEP]
+        for topic in topics:
+            self._recorded[topic].skip(count)
+        self.compared += count * len(topics)
+        if count:
+            self.steps = step + count - 1
 
     def _compare(self, topic: str, payload: bytes, time_ns: int) -> bool:
         """Hold a message against the recorded one; False if the file has lost that."""

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from linkwind.bus.base import DynamicsLink
+from linkwind.bus.inprocess import InProcessLink
 from linkwind.credentials import DYNAMICS, Identity, identity_in
 from linkwind.errors import InputError
 from linkwind.protocol import DynamicsSession
@@ -52,10 +53,9 @@ def providers_here(
         yield link, providers.check
 
 
-def inprocess_link(session: DynamicsSession, files: Mapping[str, Path]) -> DynamicsLink:
+def inprocess_link(session: DynamicsSession, files: Mapping[str, Path]) -> InProcessLink:
     """Return a bus whose providers are in this process."""
     from linkwind.aero.service import session as provider_session
-    from linkwind.bus.inprocess import InProcessLink
 
     return InProcessLink(session, [provider_session(name, files.get(name)) for name in session.providers])
 

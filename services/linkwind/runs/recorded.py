@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
+from itertools import islice
 
 from google.protobuf.message import DecodeError
 
@@ -31,16 +32,17 @@ class DifferError(Exception):
 
 
 class Recorded:
-    """The messages of one topic, asked for one after the other; one chunk of the file is in memory.
-
-    Attributes:
-        next: the message that comes next in the file, None behind the last one.
-    """
+    """The messages of one topic, asked for one after the other; a few chunks of the file are in memory."""
 
     def __init__(self, log: Log, topic: str) -> None:
         self._messages = log.of_topic(topic)
         self._number = 0
-        self.next: Message | None = next(self._messages, None)
+        self._waiting = deque(islice(self._messages, 1))
+
+    @property
+    def next(self) -> Message | None:
+        """The message that comes next in the file, None behind the last one."""
+        return self._waiting[0] if self._waiting else None
 
     def take(self) -> Message | None:
         """Return the next message of the run, None if the file has lost it or has ended."""
@@ -48,8 +50,34 @@ class Recorded:
         found = self.next
         if found is None or found[1] != self._number:
             return None
-        self.next = next(self._messages, None)
+        self._drop(1)
         return found
+
+    def ahead(self, count: int, time_ns: int, step_ns: int) -> list[bytes]:
+        """Return up to ``count`` messages that come next, as far as none is lost.
+
+        The first is expected at ``time_ns`` and each ``step_ns`` after the one before.
+        """
+        self._waiting.extend(islice(self._messages, max(0, count - len(self._waiting))))
+        number, payloads = self._number, list[bytes]()
+        for _, sequence, at_ns, payload in islice(self._waiting, count):
+            number += 1
+            if sequence != number or at_ns != time_ns:
+                break
+            payloads.append(payload)
+            time_ns += step_ns
+        return payloads
+
+    def skip(self, count: int) -> None:
+        """Pass over messages of which ``ahead`` has told."""
+        self._number += count
+        self._drop(count)
+
+    def _drop(self, count: int) -> None:
+        for _ in range(count):
+            self._waiting.popleft()
+        if not self._waiting:
+            self._waiting.extend(islice(self._messages, 1))
 
 
 class RecordedWrenches:

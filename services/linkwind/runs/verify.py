@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 
 from linkwind import schema
 from linkwind.bus.base import DynamicsLink
+from linkwind.dynamics.march import RecordedMarch
 from linkwind.dynamics.recorder import Recorder, tables_sha256
 from linkwind.dynamics.service import DynamicsService
 from linkwind.errors import InputError, LinkwindError, LogError, StoppedError
@@ -147,7 +148,12 @@ def _again(
         service = DynamicsService(scenario, mechanism, log.run, changes_of(log), orders_of(log, scenario))
         session = service.session
         recorder = Recorder(comparison, scenario, mechanism, service.multibody)
-        link = RecordedWrenches(session, log) if recorded else inprocess_link(session, files)
+        if recorded:
+            link: DynamicsLink = RecordedWrenches(session, log)
+        else:
+            session.course = replace(session.course, recovery=False)  # nobody is ever lost here
+            link = inprocess_link(session, files)
+            service.march = RecordedMarch(comparison, link.providers)
         return link, lambda progress: service.run(link, recorder, progress).final_state_sha256
     if recorded:
         raise InputError(
