@@ -111,6 +111,42 @@ def test_a_mechanism_in_space_is_orbited(browser, logs):
         assert troubles(browser) == []
 
 
+# How far the room reaches from the middle of its picture, as parts of the way to the edge: right, up.
+REACH = """(() => {
+  const { bounds, cameraParams } = space._fullLayout.scene._scene.glplot, all = [0, 1, 2, 3];
+  const through = (m, p) => all.map((i) => all.reduce((sum, k) => sum + m[4 * k + i] * p[k], 0));
+  const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((c) => {
+    const corner = [0, 1, 2].map((k) => bounds[(c >> k) & 1][k]);
+    const { model, view, projection } = cameraParams;
+    const p = [model, view, projection].reduce((q, m) => through(m, q), [...corner, 1]);
+    return [Math.abs(p[0] / p[3]), Math.abs(p[1] / p[3])];
+  });
+  return [0, 1].map((k) => Math.max(...corners.map((corner) => corner[k])));
+})()"""
+
+
+@pytest.mark.parametrize("size", [(1400, 900), (820, 1100), (390, 844)])
+def test_the_numbers_around_the_room_are_in_the_picture(browser, logs, size):
+    wide, high = size
+    browser.send(
+        "Emulation.setDeviceMetricsOverride", width=wide, height=high, deviceScaleFactor=1, mobile=False
+    )
+    try:
+        with served(logs["space"]) as url:
+            show(browser, url)
+            plot = "space._fullLayout.scene._scene.glplot"
+            browser.until(f"document.querySelector('#space canvas') && {plot}.cameraParams")
+            right, up = browser.evaluate(REACH)
+            w, h = browser.evaluate("[space.clientWidth, space.clientHeight]")
+            assert right * w / 2 < w / 2 - 20  # px for the numbers
+            assert up * h / 2 < h / 2 - 20
+            assert max(right, up) > 0.6  # and the mechanism is not small
+    finally:
+        browser.send(
+            "Emulation.setDeviceMetricsOverride", width=1400, height=900, deviceScaleFactor=1, mobile=False
+        )
+
+
 def test_of_a_long_log_a_sample_is_shown_and_all_where_somebody_looks(browser, logs, monkeypatch):
     monkeypatch.setattr(recordings, "WHOLE", (50, 1e9))
     monkeypatch.setattr(recordings, "SAMPLES", 21)

@@ -60,7 +60,8 @@ export function makeScene(canvas, motion, clock) {
     for (let x = Math.ceil(x0 / step) * step; x < x0 + camera.w / camera.scale; x += step) {
       const [px] = camera.project([x, 0, 0]);
       pen.beginPath(); pen.moveTo(px, 0); pen.lineTo(px, camera.h); pen.stroke();
-      if (px > 40 && px < camera.w - 20) pen.fillText(text(x), px, camera.h - 5);
+      const half = pen.measureText(text(x)).width / 2;
+      if (px > 40 && px + half < camera.w - 4) pen.fillText(text(x), px, camera.h - 5);
     }
     pen.textAlign = "left";
     for (let y = Math.ceil(y0 / step) * step; y < y0 + camera.h / camera.scale; y += step) {

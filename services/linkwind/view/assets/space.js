@@ -4,7 +4,7 @@ import { bodyColour, theme } from "/report/charts.js";
 import { add, length, nice, number, turned } from "/report/motion.js";
 
 const SIDES = 10; // of the head of an arrow
-const ARROW = 0.18; // of the room's side, the longest arrow: it stays in the room wherever it begins
+const ARROW = 0.14; // of the room's side, the longest arrow: it stays in the room wherever it begins
 const FRAME = 30; // ms between two pictures at least
 
 // Triangles over closed lines of a body: caps, and sides between the two faces of an outline.
@@ -61,7 +61,7 @@ export function makeSpace(host, motion, clock) {
   function room(now) {
     const { low, high, reach } = motion.world;
     const middle = follow.checked ? motion.centre(now) : low.map((x, k) => (x + high[k]) / 2);
-    const half = follow.checked ? 1.6 * reach : 0.8 * Math.max(...high.map((x, k) => x - low[k]), 1e-9);
+    const half = follow.checked ? 1.4 * reach : 0.7 * Math.max(...high.map((x, k) => x - low[k]), 1e-9);
     return middle.map((x) => [x - half, x + half]);
   }
 
@@ -119,6 +119,14 @@ export function makeSpace(host, motion, clock) {
     ];
   }
 
+  // From so far away that the whole room is in the picture, with the numbers below its edges.
+  function camera() {
+    const from = scene.up === "z" ? [0.63, -0.72, 0.29] : [0.5, 0.33, 0.8];
+    const { clientWidth: w, clientHeight: h } = host, away = (2 + 80 / h) * Math.max(1, (1.05 * h) / w);
+    const [x, y, z] = from.map((part) => away * part);
+    return { up, eye: { x, y, z }, center: { x: 0, y: -0.1 * up.y, z: -0.1 * up.z } };
+  }
+
   function layout(ranges) {
     const axis = (range, title) => ({
       range, title: { text: title }, color: colour("soft"), gridcolor: colour("line"), zerolinecolor: colour("line"),
@@ -131,7 +139,7 @@ export function makeSpace(host, motion, clock) {
       uirevision: "kept", annotations: words(),
       scene: {
         aspectmode: "cube", dragmode: "orbit", xaxis: axis(x, "x [m]"), yaxis: axis(y, "y [m]"), zaxis: axis(z, "z [m]"),
-        camera: { up, eye: scene.up === "z" ? { x: 0.95, y: -1.1, z: 0.45 } : { x: 0.75, y: 0.5, z: 1.2 } },
+        camera: camera(),
       },
     };
   }
