@@ -145,6 +145,7 @@ def info(file: FileArgument) -> None:
 
     Example: linkwind fmu info two_link.fmu
     """
+    from linkwind.cli.tables import console
     from linkwind.fmi.info import show
 
-    show(file)
+    show(file, console())

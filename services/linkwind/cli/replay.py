@@ -107,9 +107,8 @@ def replay(
     shown = identity_in(tls, "dynamics")
 
     def tell() -> None:
-        if not as_json:
-            where = ", ".join([*ends["listen"], *ends["connect"]])
-            typer.echo(f"waiting at {where} for a subscriber of linkwind/v1/{source.run}/**")
+        where = ", ".join([*ends["listen"], *ends["connect"]])
+        typer.echo(f"waiting at {where} for a subscriber of linkwind/v1/{source.run}/**", err=True)
 
     def job(progress: Callable[[float], None]) -> Replayed:
         return replay_log(

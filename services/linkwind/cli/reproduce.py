@@ -50,8 +50,9 @@ def reproduce(
 
 
 def _show(found: Reproduced) -> None:
-    from rich.console import Console
     from rich.table import Table
+
+    from linkwind.cli.tables import console
 
     table = Table(title="Rahmati & Karimi 2021", caption=f"{sum(c.holds for c in found.claims)} hold")
     for heading in ("The paper says", "Measured"):
@@ -61,5 +62,5 @@ def _show(found: Reproduced) -> None:
     for claim in found.claims:
         word = "[green]holds[/]" if claim.holds else "[bold red]does not[/]"
         table.add_row(claim.claim, claim.measure.replace("[", r"\["), f"{claim.value:.3g}", word)
-    Console().print(table)
+    console().print(table)
     typer.echo(str(found.page))

@@ -139,9 +139,9 @@ def _run(suite: Suite, short: bool, chosen: tuple[str, ...]) -> tuple[list[Row],
 
 
 def _show(title: str, rows: list[Row]) -> None:
-    from rich.console import Console
     from rich.table import Table
 
+    from linkwind.cli.tables import console
     from linkwind.runs.validate.page import HEADINGS, NUMBERS, cells, summary
 
     table = Table(title=title, caption=summary(rows))
@@ -152,4 +152,4 @@ def _show(title: str, rows: list[Row]) -> None:
         colour = {True: "green", False: "bold red", None: "dim"}[row.ok]
         texts = zip(HEADINGS, cells(row), strict=True)
         table.add_row(*(text if heading else f"[{colour}]{text}[/]" for heading, text in texts))
-    Console().print(table)
+    console().print(table)

@@ -15,13 +15,12 @@ from linkwind.fmi.slave import read_description
 INTERFACES = ("CoSimulation", "ModelExchange", "ScheduledExecution")
 
 
-def show(file: Path, console: Console | None = None) -> None:
+def show(file: Path, out: Console) -> None:
     """Print model, platforms, capabilities and variables of an FMU.
 
     Raises:
         InputError: the file is not there or is no FMU.
     """
-    out = console or Console()
     description = read_description(file)
     out.print(_model(file, description))
     out.print(_capabilities(file))

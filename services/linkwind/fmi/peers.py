@@ -14,7 +14,7 @@ from pathlib import Path
 
 from linkwind.fmi.slave import read_description
 
-MISSING = "not installed"
+MISSING = "not installed: pip install {}"
 _TIMEOUT = 60.0  # s, of a foreign tool
 # Ten steps of a millisecond, each in a process of its own: these tools are native code.
 _ECOS = """
@@ -50,7 +50,7 @@ def fmpy(file: Path) -> list[str] | str:
 def fmu_manipulation_toolbox(file: Path) -> list[str] | str:
     """Let fmutool check schema and semantics."""
     if importlib.util.find_spec("fmu_manipulation_toolbox") is None:
-        return MISSING
+        return MISSING.format("fmu-manipulation-toolbox")
     from fmu_manipulation_toolbox.checker import get_checkers
     from fmu_manipulation_toolbox.operations import FMU
 
@@ -87,7 +87,7 @@ def libcosim(file: Path) -> list[str] | str:
 
 def _simulate(module: str, script: str, file: Path) -> list[str] | str:
     if importlib.util.find_spec(module) is None:
-        return MISSING
+        return MISSING.format(module)
     command = [sys.executable, "-c", script, str(file.resolve())]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=_TIMEOUT, check=False)
