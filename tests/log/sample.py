@@ -25,6 +25,7 @@ SCENARIO = {
         {"name": "ball", "mass": 0.5},
     ],
     "joints": [{"name": "hinge", "parent": "link1", "child": "link2", "child_point": [-0.15, 0.0, 0.0]}],
+    "environment": {},
 }
 NAMES = ("link1", "link2", "ball")
 N, NQ, NV = 3, 5, 4

@@ -111,6 +111,20 @@ def test_arrows_are_the_forces(pictures):
             np.testing.assert_allclose(drawn, force, rtol=0.0, atol=1e-9)
 
 
+def test_what_stands_still_is_drawn_in_the_world(tmp_path):
+    floor = {"type": "box", "size": [4.0, 4.0, 0.1], "position": [1.0, 2.0, 3.0]}
+    described = json.dumps(SCENARIO | {"environment": {"picture": [floor]}})
+    with new_writer(tmp_path / "log.mcap", scenario_json=described) as writer:
+        writer.scene(0, Motion.at_rest(N), np.zeros((N, 3)))
+        writer.close(final_state_sha256="00")
+    ((_, _, update),) = parsed(tmp_path / "log.mcap", "/scene")
+    (entity,) = [each for each in update.entities if each.id == "environment"]
+    (cube,) = entity.cubes
+    assert entity.frame_id == "world"
+    assert vector(cube.pose.position).tolist() == [1.0, 2.0, 3.0]
+    assert vector(cube.size).tolist() == [4.0, 4.0, 0.1]
+
+
 @pytest.mark.parametrize("force", [[np.nan, 0.0, 0.0], [np.inf, 1.0, 0.0]])
 def test_a_force_that_is_no_number_is_not_drawn(force):
     wrench = Wrench.zeros(N)

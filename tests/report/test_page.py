@@ -250,6 +250,16 @@ def test_a_run_in_three_dimensions_has_the_third_component():
     assert scene["gusts"]
 
 
+def test_what_stands_still_is_drawn_where_it_is():
+    run = planar(5)
+    floor = {"type": "box", "size": [4.0, 0.2, 2.0], "position": [1.0, -3.0, 0.0]}
+    environment = run.scenario["environment"] | {"picture": [floor]}
+    page = Page(render(dataclasses.replace(run, scenario=run.scenario | {"environment": environment})))
+    points = np.vstack([line["points"] for line in page.data["scene"]["still"]])
+    assert (points.min(axis=0).tolist(), points.max(axis=0).tolist()) == ([-1, -3.1, -1], [3, -2.9, 1])
+    assert Page(render(run)).data["scene"]["still"] == []
+
+
 def test_without_joints_there_is_no_joint_panel():
     page = Page(render(planar(5, joints=[])))
     assert "Joint forces" not in [panel["title"] for panel in page.data["panels"]]

@@ -35,6 +35,7 @@ STANDARD_GRAVITY = 9.80665  # m/s²
 
 LINK = Color(r=0.27, g=0.51, b=0.71, a=1.0)
 JOINT = Color(r=0.90, g=0.60, b=0.00, a=1.0)
+STILL = Color(r=0.60, g=0.62, b=0.65, a=1.0)
 FORCE = Color(r=0.80, g=0.25, b=0.20, a=1.0)
 
 
@@ -43,7 +44,7 @@ class Scene:
 
     A body is its pictures, or else the solid of its shape, or else a ball; a joint is a small sphere at its
     point on the child; a force is an arrow from the centre of mass, as long as the longest extent for the
-    weight of the heaviest body.
+    weight of the heaviest body; what stands still are the pictures of the environment.
 
     Args:
         scenario: the resolved scenario as parsed JSON.
@@ -59,6 +60,7 @@ class Scene:
         self._names = [body["name"] for body in bodies]
         shapes = [shape_of(body.get("shape")) for body in bodies]
         pictures = [pictures_of(body) for body in bodies]
+        self._still: dict[str, Any] = drawn(pictures_of(scenario["environment"]), STILL)
         self._length = _length(shapes, pictures, scenario["joints"])
         weight = max(body["mass"] for body in bodies) * STANDARD_GRAVITY
         self._metres_per_newton = self._length / weight if weight > 0.0 else self._length
@@ -107,6 +109,8 @@ class Scene:
             )
             arrows = self._arrows(position, newtons)
             entities.append(SceneEntity(timestamp=stamp, frame_id="world", id=f"{name} force", arrows=arrows))
+        if any(self._still.values()):
+            entities.append(SceneEntity(timestamp=stamp, frame_id="world", id="environment", **self._still))
         return SceneUpdate(entities=entities)
 
     def _arrows(self, position: list[float], force: list[float]) -> list[ArrowPrimitive]:

@@ -18,7 +18,7 @@ from linkwind.mechanism.quaternion import matrix
 from linkwind.mechanism.remarks import Remark, comment
 from linkwind.native.tables import JOINT_TYPES
 from linkwind.scenario import Body, Circle, Plate, Rectangle, Scenario
-from linkwind.scenario.pictures import Box, Capsule, Cylinder, Ellipsoid, Mesh, Picture
+from linkwind.scenario.pictures import Box, Capsule, Cylinder, Ellipsoid, Mesh, Picture, Pictures
 from linkwind.spatial import Array
 
 TYPES = {
@@ -50,7 +50,8 @@ def export_urdf(scenario: Scenario) -> Exported:
     """
     mechanism = build(scenario)
     root = ET.Element("robot", name=scenario.name)
-    ET.SubElement(root, "link", name="world")
+    world = ET.SubElement(root, "link", name="world")
+    world.extend(_visual(*drawn) for drawn in _of_pictures(scenario.environment.picture))
     for index, body in enumerate(scenario.bodies):
         root.append(_link(body, -mechanism.tables.child_point[index], mechanism.tables.inertia[index]))
         root.extend(_joints(scenario, mechanism, index))
@@ -72,12 +73,17 @@ def _link(body: Body, centre: Array, inertia: Array) -> ET.Element:
         ET.SubElement(inertial, "mass", value=repr(body.mass))
         six = zip(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), inertia.tolist(), strict=True)
         ET.SubElement(inertial, "inertia", {key: repr(value) for key, value in six})
-    for geometry, position, rotation in _drawn(body):
-        visual = ET.SubElement(link, "visual")
-        xyz, rpy = _numbers(centre + position), _numbers(roll_pitch_yaw(rotation))
-        ET.SubElement(visual, "origin", xyz=xyz, rpy=rpy)
-        ET.SubElement(visual, "geometry").append(geometry)
+    link.extend(
+        _visual(geometry, centre + position, rotation) for geometry, position, rotation in _drawn(body)
+    )
     return link
+
+
+def _visual(geometry: ET.Element, position: Array, rotation: Array) -> ET.Element:
+    visual = ET.Element("visual")
+    ET.SubElement(visual, "origin", xyz=_numbers(position), rpy=_numbers(roll_pitch_yaw(rotation)))
+    ET.SubElement(visual, "geometry").append(geometry)
+    return visual
 
 
 def _joints(scenario: Scenario, mechanism: Mechanism, index: int) -> Iterator[ET.Element]:
@@ -124,10 +130,7 @@ def _joint(
 
 def _drawn(body: Body) -> Iterator[tuple[ET.Element, Array, Array]]:
     """Return what is drawn of a body: geometry, position from the centre of mass [m], rotation."""
-    for picture in body.picture:
-        rotation = matrix(np.array(picture.orientation))
-        for geometry, along in _geometry(picture):
-            yield geometry, np.array(picture.position) + rotation @ (along * Z), rotation
+    yield from _of_pictures(body.picture)
     shape = body.shape
     if body.picture or shape is None:
         return
@@ -136,6 +139,13 @@ def _drawn(body: Body) -> Iterator[tuple[ET.Element, Array, Array]]:
     elif isinstance(shape, Plate | Rectangle):
         width = shape.width if isinstance(shape, Rectangle) else 0.01 * shape.length
         yield ET.Element("box", size=_numbers([shape.length, width, shape.span])), np.zeros(3), np.eye(3)
+
+
+def _of_pictures(pictures: Pictures) -> Iterator[tuple[ET.Element, Array, Array]]:
+    for picture in pictures:
+        rotation = matrix(np.array(picture.orientation))
+        for geometry, along in _geometry(picture):
+            yield geometry, np.array(picture.position) + rotation @ (along * Z), rotation
 
 
 def _geometry(picture: Picture) -> Iterator[tuple[ET.Element, float]]:

@@ -34,6 +34,7 @@ def scene(run: Run) -> dict[str, Any] | None:
         "joints": [_joint(run, joint) for joint in run.scenario.get("joints", ())],
         "planar": run.planar,
         "up": "z" if not run.planar and gravity[2] > gravity[1] else "y",
+        "still": [line for picture in pictures_of(environment) for line in _as_data(wires(picture))],
         "wind": environment["wind"],
         "gusts": bool(environment["gusts"]),
     }
@@ -46,10 +47,14 @@ def _body(run: Run, index: int) -> dict[str, Any]:
     return {
         "name": body["name"],
         "mass": max(body["mass"], 1e-12),  # weights of a mean, which must not all be 0
-        "lines": [{"points": points.tolist(), "closed": closed} for points, closed in lines],
+        "lines": _as_data(lines),
         "thick": not body.get("picture") and (body.get("shape") or {"type": "plate"})["type"] == "plate",
         "reach": float(np.linalg.norm(points[:, : 2 if run.planar else 3], axis=1).max()),
     }
+
+
+def _as_data(lines: list[Line]) -> list[dict[str, Any]]:
+    return [{"points": points.tolist(), "closed": closed} for points, closed in lines]
 
 
 def _joint(run: Run, joint: Mapping[str, Any]) -> dict[str, Any]:

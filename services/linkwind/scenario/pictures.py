@@ -1,4 +1,4 @@
-"""What is drawn of a body in place of its shape: solids and meshes, which no force model sees."""
+"""What is drawn of a body in place of its shape, or of the surroundings: no force model sees it."""
 
 from __future__ import annotations
 
@@ -15,10 +15,14 @@ _KIND = "The kind of picture"
 
 class _Placed(Section):
     position: Vector = quantity(
-        "Where its middle is, in the body frame from the centre of mass", "m", (0.0, 0.0, 0.0)
+        "Where its middle is, in the body frame from the centre of mass; of environment: in the world",
+        "m",
+        (0.0, 0.0, 0.0),
     )
     orientation: Quaternion = quantity(
-        "How it is turned: unit quaternion [w, x, y, z], picture to body", "1", (1.0, 0.0, 0.0, 0.0)
+        "How it is turned: unit quaternion [w, x, y, z], picture to body, or to world",
+        "1",
+        (1.0, 0.0, 0.0, 0.0),
     )
 
 
@@ -98,5 +102,5 @@ _ANY: TypeAdapter[Pictures] = TypeAdapter(Annotated[Pictures, Field(strict=False
 
 
 def pictures_of(data: Mapping[str, Any]) -> Pictures:
-    """Return the pictures of a body that a resolved scenario holds as data."""
+    """Return the pictures of a body, or of the environment, that a resolved scenario holds as data."""
     return _ANY.validate_python(data.get("picture", ()))

@@ -7,6 +7,7 @@ from typing import Literal
 
 from pydantic import Field, field_validator
 
+from linkwind.scenario.pictures import Pictures
 from linkwind.scenario.problems import ProblemError
 from linkwind.scenario.quantities import Section, Vector, quantity
 
@@ -52,6 +53,9 @@ class Environment(Section):
     wind: Vector = quantity("Velocity of the undisturbed fluid, in the world", "m/s", ZERO)
     gusts: tuple[Gust, ...] = Field(
         default=(), strict=False, description="Waves that travel through the wind"
+    )
+    picture: Pictures = Field(
+        default=(), strict=False, description="What is drawn of what stands still; no force model sees it"
     )
 
 

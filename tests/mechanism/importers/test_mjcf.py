@@ -130,6 +130,12 @@ def test_pictures_are_where_mujoco_has_the_geometry(tmp_path):
         np.testing.assert_allclose(turned, data.geom_xmat[geom], atol=1e-13)
 
 
+def test_pictures_of_the_world_stay_there(tmp_path):
+    table = '<geom type="box" size="0.5 1 0.1" pos="0 3 0"/><body name="trunk"'
+    (picture,) = imported(tmp_path, ROBOT.replace('<body name="trunk"', table)).scenario.environment.picture
+    assert (picture.size, picture.position) == ((1.0, 2.0, 0.2), (0.0, 3.0, 0.0))
+
+
 LOOP = """
 <mujoco>
   <worldbody>

@@ -280,6 +280,25 @@ def test_pictures_are_where_the_file_has_them(tmp_path):
     assert (cylinder.diameter, cylinder.length, mesh.file) == (0.2, 3.0, "package://p/a.stl")
 
 
+def test_pictures_of_what_stands_still_stay_in_the_world(tmp_path):
+    """Of a stand without mass, of what is fixed to it, and of an idle knob that could turn; and out again."""
+    box = '<geometry><box size="1 2 3"/></geometry>'
+    text = (
+        f'<robot name="r"><link name="w"><visual><origin xyz="0 0 1"/>{box}</visual></link>'
+        f'<link name="stand"><visual>{box}</visual></link><link name="knob"><visual>{box}</visual></link>'
+        f'<link name="arm">{INERTIAL}</link>'
+        '<joint name="s" type="fixed"><origin xyz="0 0 2"/><parent link="w"/><child link="stand"/></joint>'
+        '<joint name="k" type="continuous"><origin xyz="0 0 3"/><parent link="w"/><child link="knob"/>'
+        '</joint><joint name="a" type="continuous"><parent link="stand"/><child link="arm"/></joint></robot>'
+    )
+    scenario = imported(tmp_path, text).scenario
+    assert [body.name for body in scenario.bodies] == ["arm"]
+    heights = [picture.position for picture in scenario.environment.picture]
+    assert sorted(heights) == [(0.0, 0.0, 1.0), (0.0, 0.0, 2.0), (0.0, 0.0, 3.0)]
+    again = imported(tmp_path, export_urdf(scenario).text).scenario
+    assert again.environment.picture == scenario.environment.picture
+
+
 def test_export_says_what_it_leaves_out():
     exported = export_urdf(load("two_link", ["joints.hinge.stiffness=2"]))
     assert {remark.what for remark in exported.remarks} == {

@@ -60,7 +60,7 @@ class _Reader:
         m = self.m
         name = m.names[: m.names.index(b"\0")].decode(errors="replace")
         gravity = np.array(m.opt.gravity) * (not self._off("GRAVITY"))
-        model = Model("MJCF", name or self.path.stem, [], gravity)
+        model = Model("MJCF", name or self.path.stem, [], gravity, pictures=self._pictures(0))
         last: dict[int, int] = {0: WORLD}  # the part at the end of each body's chain
         for body in range(1, m.nbody):
             parent = last[int(m.body_parentid[body])]

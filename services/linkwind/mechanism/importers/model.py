@@ -151,6 +151,7 @@ class Model:
         parts: parents before children.
         closures: what closes loops.
         gravity: [m/s²], shape (3,).
+        pictures: what is drawn of what stands still.
         remarks: what was left out or changed.
     """
 
@@ -159,6 +160,7 @@ class Model:
     parts: list[Part]
     gravity: Array
     closures: list[Closure] = field(default_factory=list)
+    pictures: list[Picture] = field(default_factory=list)
     remarks: list[Remark] = field(default_factory=list)
 
     def leave_out(self, what: str, why: str, items: Iterable[str]) -> None:

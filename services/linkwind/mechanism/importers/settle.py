@@ -64,6 +64,7 @@ def _merged(model: Model) -> dict[int, int]:
             continue
         if at == WORLD and not part.body:
             into[i] = WORLD
+            model.pictures += part.pictures
             model.leave_out(MERGED, "fixed to the world", [f"{part.name} → world"])
         elif at != WORLD and not (part.body and model.parts[at].body):
             into[i] = at
@@ -81,8 +82,7 @@ def _idle(model: Model) -> dict[int, int]:
             carrying.add(part.parent)
             continue
         into[i] = part.parent
-        if part.parent != WORLD:
-            model.parts[part.parent].pictures += part.pictures
+        (model if part.parent == WORLD else model.parts[part.parent]).pictures += part.pictures
         model.leave_out(IDLE, "they do not move the rest", [f"{part.name} ({part.joint.name})"])
     return into
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from linkwind.mechanism.importers.configuration import displacements
-from linkwind.mechanism.importers.model import WORLD, Closure, Model, Part, Pose
+from linkwind.mechanism.importers.model import WORLD, Closure, Model, Part, Picture, Pose
 from linkwind.mechanism.quaternion import from_matrix
 from linkwind.mechanism.remarks import comment, wrapped
 from linkwind.spatial import Array
@@ -75,6 +75,7 @@ def _settings(model: Model) -> list[str]:
         "",
         "[environment]",
         f"gravity = {_row(model.gravity)}    # m/s²",
+        *_pictures(model.pictures, np.zeros(3)),
         "",
         "[aero]",
         'model = "none"                    # no forces of a fluid; field and plate are others',
@@ -100,9 +101,13 @@ def _body(part: Part, name: str, placed: list[Pose], index: int, start: Mapping[
     if own.type == "revolute" and own.name in start:
         at = f"{own.name} at {start[own.name]:g} rad"
         yield f"orientation = {_row(from_matrix(moved.rotation))}    # {_string(at)[1:-1]}"
-    if part.pictures:
+    yield from _pictures(part.pictures, part.centre)
+
+
+def _pictures(pictures: Sequence[Picture], centre: Array) -> Iterator[str]:
+    if pictures:
         yield "picture = ["
-        yield from (f"  {_picture(picture.keys, picture.pose, part.centre)}," for picture in part.pictures)
+        yield from (f"  {_picture(picture.keys, picture.pose, centre)}," for picture in pictures)
         yield "]"
 
 

@@ -103,6 +103,18 @@ export function makeScene(canvas, motion, clock) {
     pen.globalAlpha = 1;
   }
 
+  // What stands still.
+  function surroundings() {
+    pen.strokeStyle = colour("soft");
+    pen.lineWidth = 1.5;
+    for (const { points, closed } of scene.still) {
+      pen.beginPath();
+      for (const point of points) pen.lineTo(...camera.project(point).slice(0, 2));
+      if (closed) pen.closePath();
+      pen.stroke();
+    }
+  }
+
   function bodies(now, alpha, cased = false) {
     const order = now.map((pose, b) => [camera.turn(pose.at)[2], b]).sort((p, q) => p[0] - q[0]);
     for (const [, b] of order) {
@@ -208,6 +220,7 @@ export function makeScene(canvas, motion, clock) {
     const filmed = film?.draw(pen, camera, t);
     if (scene.planar) grid();
     if (!filmed) streaks(t);
+    surroundings();
     trail(t);
     for (let i = 0; i < GHOSTS; i++) {
       const then = clock.first + (clock.last - clock.first) * i / GHOSTS;

@@ -52,6 +52,7 @@ export function makeSpace(host, motion, clock) {
   const far = Math.hypot(...motion.world.high.map((x, k) => x - motion.world.low[k]));
   follow.checked = far > 14 * motion.world.reach; // as the report does
   const bodies = scene.bodies.map((body) => ({ ...facesOf(body), edges: edgesOf(body) }));
+  const still = columns(edgesOf({ lines: scene.still }));
   const up = scene.up === "z" ? { x: 0, y: 0, z: 1 } : { x: 0, y: 1, z: 0 };
   let colour = theme(), drawn = 0, waiting = 0, ready = false;
 
@@ -89,7 +90,7 @@ export function makeSpace(host, motion, clock) {
       ranges,
       points: [
         ...bodies.flatMap(({ points, edges }, b) => [place(now[b], points), place(now[b], edges)]),
-        columns(joints), columns(lines), columns(heads), columns(path),
+        columns(joints), columns(lines), columns(heads), columns(path), still,
       ],
     };
   }
@@ -109,13 +110,14 @@ export function makeSpace(host, motion, clock) {
         { type: "scatter3d", mode: "lines", ...at(points[2 * b + 1]), line: { color: own, width: 4 } },
       ];
     });
-    const [joints, lines, heads, path] = points.slice(2 * bodies.length);
+    const [joints, lines, heads, path, around] = points.slice(2 * bodies.length);
     return [
       ...made,
       { type: "scatter3d", mode: "markers", ...at(joints), marker: { size: 5, color: colour("card"), line: { color: colour("ink"), width: 2 } } },
       { type: "scatter3d", mode: "lines", ...at(lines), line: { color: colour("force"), width: 6 } },
       { type: "mesh3d", ...at(heads), i: i(ring), j: j(ring), k: k(ring), color: colour("force"), lighting: light },
       { type: "scatter3d", mode: "lines", ...at(path), line: { color: colour("soft"), width: 2, dash: "solid" } },
+      { type: "scatter3d", mode: "lines", ...at(around), line: { color: colour("soft"), width: 3 } },
     ];
   }
 
