@@ -17,6 +17,8 @@ from linkwind.report.data import Diagnostics, read
 from linkwind.report.film import FRAMES, film
 from linkwind.report.flow import shown, speed, survey
 from linkwind.report.page import render
+from linkwind.runs.run import run as fly
+from linkwind.scenario import load
 
 from .synthetic import planar
 from .test_log import write_log
@@ -223,3 +225,17 @@ def test_matplotlib_is_loaded_for_frames_alone(tmp_path):
         "assert 'matplotlib' not in sys.modules and 'PIL' not in sys.modules"
     )
     subprocess.run([sys.executable, "-W", "error", "-c", code], check=True)
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "reynolds"),
+    [("cylinder", ("aero.flow.cells=10",), "100"), ("two_link_flow", ("aero.flow.cells=16",), "170,000")],
+)
+def test_a_page_states_the_reynolds_number_and_where_two_dimensions_end(tmp_path, name, settings, reynolds):
+    """U L / ν: 1 · 1 / 0.01, and 5 · 0.5 / 1.5e-5."""
+    step = load(name).coupling.step
+    few = load(name, ["bus.transport=inprocess", f"time.end={5 * step!r}", *settings])
+    page = fly(few, tmp_path / "out", lambda step: None).report.read_text()
+    caption = page.split("The log holds", 1)[1].split("</figcaption>")[0]
+    assert f"up to {reynolds}." in caption
+    assert ("a real wake is three-dimensional" in caption) == (name == "two_link_flow")

@@ -9,10 +9,12 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from pathlib import Path
 
 from linkwind.aero.base import Capabilities, ForceModel, item
+from linkwind.aero.doubts import doubts
 from linkwind.aero.field import ForceField
 from linkwind.aero.flow import Flow
 from linkwind.aero.none import Vacuum
@@ -29,6 +31,7 @@ MODELS: dict[str, Callable[[Scenario, Provider], ForceModel]] = {
     "flow": Flow,
 }
 
+_log = logging.getLogger("linkwind")
 
 FROM_FILE = ("fmu",)  # models that are made from a file
 
@@ -58,7 +61,7 @@ def build(scenario: Scenario, provider: Provider, file: Path | None = None) -> F
 
 
 def check(scenario: Scenario) -> None:
-    """Find what is wrong with the settings of a model before anything is started.
+    """Find what is wrong with the settings of a model before anything is started, and log what may be.
 
     Raises:
         InputError: the scenario does not give what a model needs.
@@ -66,3 +69,5 @@ def check(scenario: Scenario) -> None:
     for provider in scenario.providers:
         if provider.model not in FROM_FILE:
             build(scenario, provider)
+    for doubt in doubts(scenario):
+        _log.warning("note: %s", doubt)

@@ -9,10 +9,42 @@ from linkwind.report.data import Run
 from linkwind.report.flow import Flow
 from linkwind.report.tables import number
 
+CELL_REYNOLDS = "cell_reynolds"  # a diagnostic of the flow: of a cell and the fastest of wind and bodies
+SPATIAL = 1000  # Reynolds number from which the wake of a bluff body is far from two-dimensional
+
 
 def gallery(run: Run) -> str:
     """Return the pictures of every provider's flow with their captions; nothing for a run without frames."""
     return "\n".join(_figure(run, flow) for flow in run.flows)
+
+
+def _limits(run: Run, flow: Flow) -> str:
+    """Return the Reynolds number, and what a flow in two dimensions cannot show from some on."""
+    reynolds = _reynolds(run, flow.provider)
+    if reynolds is None:
+        return ""
+    said = (
+        f" Reynolds number of the longest body and the fastest of wind and bodies: up to {_round(reynolds)}."
+    )
+    spatial = (
+        f" Above about {_round(SPATIAL)} a real wake is three-dimensional; in two dimensions, as here, "
+        "vortices are stronger, and a bluff body has more drag."
+    )
+    return said + spatial * (reynolds >= SPATIAL)
+
+
+def _reynolds(run: Run, provider: str) -> float | None:
+    """Return the largest Reynolds number that a model "flow" reports, None for another one."""
+    settings = next(each for each in run.scenario["providers"] if each["name"] == provider)
+    numbers = next((each for each in run.diagnostics if each.provider == provider), None)
+    if settings["model"] != "flow" or numbers is None or CELL_REYNOLDS not in numbers.names:
+        return None
+    of_a_cell = numbers.values[:, numbers.names.index(CELL_REYNOLDS)]
+    return float(of_a_cell.max()) * float(settings["flow"]["cells"])
+
+
+def _round(value: float) -> str:
+    return f"{float(f'{value:.2g}'):,.0f}"
 
 
 def _figure(run: Run, flow: Flow) -> str:
@@ -30,7 +62,7 @@ def _figure(run: Run, flow: Flow) -> str:
     caption = (
         f"Flow of {flow.provider} {seen}. Above: speed and streamlines. Below: vorticity, red turns "
         f"counter-clockwise.{joints} One scale for all times; where it ends in a tip, values lie beyond. "
-        f"The log holds {len(flow.t)} frames."
+        f"The log holds {len(flow.t)} frames.{_limits(run, flow)}"
     )
     source = f"data:image/png;base64,{base64.b64encode(data).decode('ascii')}"
     return (

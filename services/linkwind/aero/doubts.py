@@ -1,0 +1,51 @@
+"""What is not wrong in a scenario, but perhaps not what was meant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from linkwind.aero.base import item
+from linkwind.aero.flow import grid as grids
+from linkwind.scenario import Provider, Scenario
+
+WITHOUT_WIND = ("none", "field")  # models that read no wind from the scenario
+# Without the response a body wants so many times the mass of fluid that it accelerates, by the number of
+# lattice steps in a communication step; measured on free plates.
+WANTED = ((2, 1.0), (math.inf, 2.0))
+
+
+def doubts(scenario: Scenario) -> Iterator[str]:
+    """Yield what to tell the user before a run, a sentence each; the scenario has been checked."""
+    yield from _no_wind(scenario)
+    for provider in scenario.providers:
+        if provider.model == "flow":
+            yield from _too_light(scenario, provider)
+
+
+def _no_wind(scenario: Scenario) -> Iterator[str]:
+    models = {provider.model for provider in scenario.providers}
+    blows = any(scenario.environment.wind) or scenario.environment.gusts
+    if blows and "field" in models and models <= set(WITHOUT_WIND):
+        yield (
+            f"{scenario.source}: environment: the wind moves nothing here: a field is what its expressions "
+            "say. Write the wind into them, or use model plate."
+        )
+
+
+def _too_light(scenario: Scenario, provider: Provider) -> Iterator[str]:
+    grid = grids.plan(scenario, provider)
+    if grid.substeps == 1:
+        return
+    wanted = next(ratio for count, ratio in WANTED if grid.substeps <= count)
+    for body in grids.bodies(scenario, provider):
+        assert body.shape is not None
+        # Of a plate across its motion, and of a circle; of other shapes it is the most that it can be, about.
+        fluid = 0.25 * math.pi * grid.density * body.shape.reference_length**2
+        if body.mass < wanted * fluid:
+            yield (
+                f'{item(scenario, provider, "flow", "cells")}: "{body.name}", {body.mass:g} kg, accelerates '
+                f"about {fluid:.2g} kg of fluid, and there are {grid.substeps} lattice steps in a "
+                f"coupling.step of {scenario.coupling.step:g} s, which is stable for bodies of {wanted:g} times "
+                f"that mass and more. Should the run diverge, use at most {grid.step:.2g} s."
+            )

@@ -1,0 +1,56 @@
+"""What a user is told before a run that may not do what was meant."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+
+from linkwind import aero
+from linkwind.aero.doubts import doubts
+from linkwind.errors import LinkwindError
+from linkwind.runs.run import run
+from linkwind.scenario import builtin_names, load
+
+LIGHT = [
+    "coupling.step=1e-3",
+    "aero.flow.cells=16",
+    *(f"bodies.link{i}.{setting}" for i in (1, 2) for setting in ("mass=0.1", "inertia=0.002")),
+]
+
+
+@pytest.mark.parametrize("name", builtin_names())
+def test_there_are_none_about_what_comes_along(name: str) -> None:
+    assert list(doubts(load(name))) == []
+
+
+@pytest.mark.parametrize(
+    ("settings", "told"),
+    [
+        (["environment.wind=[-50,0,0]"], True),
+        (["environment.gusts=[{amplitude=[1,0,0],frequency=1}]"], True),
+        (["environment.wind=[-50,0,0]", "aero.model=none"], False),
+        (["environment.wind=[-50,0,0]", "aero.model=plate"], False),
+    ],
+)
+def test_a_wind_that_nobody_reads(settings: list[str], told: bool, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.WARNING, "linkwind"):
+        aero.check(load("two_link_field", settings))
+    expected = "note: two_link_field.toml: environment: the wind moves nothing here"
+    assert [record.getMessage().startswith(expected) for record in caplog.records] == [True] * told
+
+
+def test_bodies_too_light_for_several_lattice_steps(tmp_path, caplog: pytest.LogCaptureFixture) -> None:
+    """The doubt names a step that helps, and the run without that step does diverge."""
+    scenario = load("two_link_flow", ["bus.transport=inprocess", "time.end=0.2", *LIGHT])
+    with caplog.at_level(logging.WARNING, "linkwind"), pytest.raises(LinkwindError):
+        run(scenario, tmp_path / "out", lambda step: None)
+    first, second = (record.getMessage() for record in caplog.records[:2])
+    assert 'aero.flow.cells: "link1", 0.1 kg, accelerates about 0.24 kg of fluid' in first
+    assert '"link2"' in second
+    advised = float(first.rsplit("use at most ", 1)[1].split(" s")[0])
+    assert list(doubts(load("two_link_flow", [*LIGHT, f"coupling.step={advised}"]))) == []
+
+
+def test_heavy_ones_go_on(caplog: pytest.LogCaptureFixture) -> None:
+    assert list(doubts(load("two_link_flow", LIGHT[:2]))) == []
