@@ -45,7 +45,7 @@ def _too_light(scenario: Scenario, provider: Provider) -> Iterator[str]:
         if body.mass < wanted * fluid:
             yield (
                 f'{item(scenario, provider, "flow", "cells")}: "{body.name}", {body.mass:g} kg, accelerates '
-                f"about {fluid:.2g} kg of fluid, and there are {grid.substeps} lattice steps in a "
-                f"coupling.step of {scenario.coupling.step:g} s, which is stable for bodies of {wanted:g} times "
-                f"that mass and more. Should the run diverge, use at most {grid.step:.2g} s."
+                f"about {fluid:.2g} kg of fluid; with {grid.substeps} lattice steps in a coupling.step of "
+                f"{scenario.coupling.step:g} s, as here, that is stable for bodies of {wanted:g} times that "
+                f"mass and more. Should the run diverge, use at most {grid.step:.2g} s."
             )
