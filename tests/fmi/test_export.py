@@ -214,3 +214,27 @@ def test_info_command(fmu):
         assert expected in text
     # In one piece, where there is no terminal that could be too narrow.
     assert "Added inertia of link1 at its centre of mass, in the body frame" in text
+
+
+def test_info_for_programs(fmu):
+    found = json.loads(invoke("info", fmu("two_link", "3"), "--json").stdout)
+    assert (found["model"], found["fmi"], found["platforms"]) == (
+        "two_link", "3.0", [toolchain.host(), "sources"]
+    )  # fmt: skip
+    assert (found["stop_s"], found["step_s"]) == (1.2, 1e-3)
+    assert found["interfaces"]["CoSimulation"]["canGetAndSetFMUState"] is True
+    assert "ScheduledExecution" not in found["interfaces"]
+    inertia = next(each for each in found["variables"] if each["name"] == "link1.A")
+    assert (inertia["shape"], inertia["causality"], inertia["type"]) == ([6, 6], "input", "Float64")
+
+
+def test_info_of_what_is_no_fmu(tmp_path):
+    (tmp_path / "no.fmu").write_bytes(b"PK")
+    for path, got in (
+        (tmp_path / "no.fmu", "it cannot be read: File is not a zip file"),
+        (tmp_path / "absent.fmu", "got no such file"),
+        (tmp_path, "got a folder"),
+    ):
+        error = invoke("info", path, "--json").exception
+        assert isinstance(error, InputError)
+        assert str(error).startswith(f"{path}: expected an FMU; {got}")

@@ -140,12 +140,15 @@ def _show(found: Checked) -> None:
         typer.echo(f"error: {error}", err=True)
 
 
-def info(file: FileArgument) -> None:
+def info(file: FileArgument, as_json: JsonOption = False) -> None:
     """Print what an FMU can do, the platforms that it runs on, and its variables.
 
     Example: linkwind fmu info two_link.fmu
     """
     from linkwind.cli.tables import console
-    from linkwind.fmi.info import show
+    from linkwind.fmi.info import facts, show
 
-    show(file, console())
+    if as_json:
+        typer.echo(json.dumps(facts(file)))
+    else:
+        show(file, console())

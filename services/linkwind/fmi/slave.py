@@ -24,7 +24,8 @@ def read_description(file: Path) -> Any:
     from fmpy import read_model_description
 
     if not file.is_file():
-        raise InputError(f"{file}: expected an FMU; got no such file. Check the path.")
+        got = "a folder" if file.is_dir() else "no such file"
+        raise InputError(f"{file}: expected an FMU; got {got}. Check the path.")
     try:
         return read_model_description(str(file), validate=False)
     except Exception as error:  # FMPy has no exception of its own
