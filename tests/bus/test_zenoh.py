@@ -324,6 +324,51 @@ def test_time_that_the_dynamics_takes_itself_is_not_the_provider_s(
     assert provider.error is None
 
 
+def test_what_is_old_does_not_give_a_silent_provider_more_time(
+    endpoint: str, open_link: Callable[..., ZenohDynamicsLink]
+) -> None:
+    """Answers to the step before keep coming, from a double; they would for a minute."""
+    release, over, given_up = threading.Event(), threading.Event(), threading.Event()
+
+    class Stuck(FakeModel):
+        def evaluate(self, t: float, motion: Motion, wrench: Wrench) -> None:
+            if t > 0.0:
+                release.wait(60.0)
+
+    d = session()
+    link = open_link(d, timeout=0.5)
+    provider = Provider(endpoint, Stuck())
+    assert link.wait(lambda: not d.not_ready, 10.0, lambda: None)
+    exchange(d, link, 0)
+    old = d.participants["aero"].payload
+    double = ZenohProviderLink([endpoint], [], name="aero")
+    double.join("r1")
+
+    def repeat() -> None:
+        for _ in range(3000):
+            double.reply(old)
+            if over.wait(0.02):
+                return
+        given_up.set()
+
+    repeating = threading.Thread(target=repeat)
+    repeating.start()
+    dropped = 0
+    link.post(d.post(1, 0))
+    with pytest.raises(AnswerTimeoutError, match=r'no Wrench from "aero" for step 1 .* within 0.5 s'):
+        while not d.answered:
+            assert not d.accept(*link.receive())
+            dropped += 1
+    assert not given_up.is_set()
+    assert dropped > 0
+    over.set()
+    repeating.join(60.0)
+    link.fault(fault("dynamics", 1, 0, AnswerTimeoutError("too late")))
+    release.set()
+    provider.join(10.0)
+    double.close()
+
+
 def test_reader_that_is_busy_does_not_fill_its_own_queue(
     endpoint: str, open_link: Callable[..., ZenohDynamicsLink], monkeypatch: pytest.MonkeyPatch
 ) -> None:

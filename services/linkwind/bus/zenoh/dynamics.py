@@ -76,7 +76,8 @@ class ZenohDynamicsLink(Endpoint):
         self._exchanging = session
         self._timeout = timeout
         self._posted_at = float("inf")
-        self._waiting_since = float("inf")
+        self._waited = 0.0  # s, for the answers to the last motion
+        self._waiting_since = float("inf")  # while it is waited for them: now, less what was waited before
         self._unsure_motion = b""
         self._resend_at: float | None = None
         self._asking = threading.Lock()
@@ -145,7 +146,7 @@ class ZenohDynamicsLink(Endpoint):
 
     def post(self, motion: bytes) -> None:
         """Send a motion message to every provider."""
-        self._resend_at = None
+        self._resend_at, self._waited = None, 0.0
         if not self._unsure_motion:
             self.repeat(motion)
         else:
@@ -153,7 +154,7 @@ class ZenohDynamicsLink(Endpoint):
 
     def repeat(self, motion: bytes) -> None:
         """Send a motion that may have to be sent once more; see :class:`~linkwind.bus.base.DynamicsLink`."""
-        self._unsure_motion = motion
+        self._unsure_motion, self._waited = motion, 0.0
         self._posted_at = time.monotonic()
         self._outgoing.put(motion)
         self._resend_at = self._posted_at + FIRST_RESEND
@@ -168,12 +169,14 @@ class ZenohDynamicsLink(Endpoint):
 
     def receive(self) -> tuple[str, bytes]:
         """Return the next wrench message and its provider; see :class:`~linkwind.bus.base.DynamicsLink`."""
-        # The provider's time to answer runs while the dynamics waits, not while it writes its log.
-        self._waiting_since = time.monotonic()
+        # A provider's time to answer runs while the dynamics waits, not while it writes its log; it does not
+        # begin again when something else comes: an old answer, or that of another provider.
+        since = self._waiting_since = time.monotonic() - self._waited
         try:
             return _named(self._receive(SPIN))
         finally:
             self._waiting_since = float("inf")
+            self._waited = time.monotonic() - since
 
     def frames(self) -> list[tuple[str, bytes]]:
         """Take the frames that have come; see :class:`~linkwind.bus.base.DynamicsLink`.
