@@ -229,6 +229,7 @@ KINDS: dict[str, Kind] = {
     for name, number in (("killed", signal.SIGKILL), ("stopped", signal.SIGSTOP))
 } | {
     "aero killed, comes back": lambda folder, chance: Trial(recovered.killed(folder, chance)),
+    "aero silent, is replaced": lambda folder, chance: Trial(recovered.silent(folder, chance)),
     "network cut, comes back": lambda folder, chance: Trial(recovered.cut_off(folder, chance)),
     "network cut, 0.1 to 10 s": cut,
     "late, then twice": twice,

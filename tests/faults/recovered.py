@@ -120,6 +120,13 @@ def killed(folder: Path, chance: Random) -> float:
     return hit(folder, signal.SIGKILL, chance.uniform(0.0, 1.5))
 
 
+def silent(folder: Path, chance: Random) -> float:
+    """Let the provider say nothing more: stop it, and wait less for an answer than for a sign of life."""
+    return hit(
+        folder, signal.SIGSTOP, chance.uniform(0.0, 1.5), "two_link", f"coupling.timeout={LEASE / 2:g}"
+    )
+
+
 def cut_off(folder: Path, chance: Random) -> float:
     """Cut the network for 2 to 10 s; return for how long the run stood still besides."""
     gone = chance.uniform(2.0, 10.0)

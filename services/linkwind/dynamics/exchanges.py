@@ -13,11 +13,11 @@ from contextlib import contextmanager
 from linkwind.bus.base import DynamicsLink
 from linkwind.dynamics.recorder import MessageLog
 from linkwind.dynamics.recovery import Patience, Recovery
-from linkwind.errors import LostError, StoppedError
+from linkwind.errors import AnswerTimeoutError, LostError, StoppedError
 from linkwind.log.state import TimingEncoder
 from linkwind.protocol import DynamicsSession, fault
 
-GOODBYE_TIMEOUT = 5.0  # s that a provider may take to commit the last state and say Bye
+GOODBYE_TIMEOUT = 5.0  # s that a provider may take to commit the last state and say Bye, if not for an answer
 
 
 class Exchanges:
@@ -46,6 +46,7 @@ class Exchanges:
         """
         self._session, self._link, self._log, self._poll = session, link, log, poll
         self.recovery = Recovery(session, link, patience, poll)
+        self._goodbye = max(GOODBYE_TIMEOUT, patience.answer)
         self._timing = TimingEncoder()
 
     @contextmanager
@@ -108,7 +109,9 @@ class Exchanges:
                 return self._link.receive()
             except LostError as loss:
                 self.recovery.bring_back(loss)
-                self._link.repeat(payload)
+            except AnswerTimeoutError as late:
+                self.recovery.replace(late)
+            self._link.repeat(payload)
 
     def _wait(self, done: Callable[[], bool], timeout: float, payload: bytes = b"") -> bool:
         """Wait until ``done`` holds, like the link; a loss on the way is made good, with the last motion."""
@@ -135,14 +138,16 @@ class Exchanges:
         """Send the last motion and wait for every Bye; see :meth:`ask`.
 
         Raises:
-            LostError: a provider did not say it.
+            AnswerTimeoutError: a provider did not say it.
         """
         session = self._session
         self._link.post(payload)
         meanwhile()
         self._log.motion(payload, session.motion.time_ns)
-        if not self._wait(lambda: not session.not_gone, GOODBYE_TIMEOUT, payload):
+        while not self._wait(lambda: not session.not_gone, self._goodbye, payload):
             missing = " and ".join(f'"{name}"' for name in session.not_gone)
-            raise LostError(f"{missing} did not say Bye within {GOODBYE_TIMEOUT:g} s of the last step")
+            late = f"{missing} did not say Bye within {self._goodbye:g} s of the last step; it is alive"
+            self.recovery.replace(AnswerTimeoutError(late))
+            self._link.repeat(payload)
         self._take_shown()
         session.check_frames()

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from linkwind.bus.base import DynamicsLink
-from linkwind.errors import LostError
+from linkwind.errors import AnswerTimeoutError, LostError
 from linkwind.protocol import DynamicsSession
 from linkwind.scenario import Scenario
 
@@ -109,6 +109,28 @@ class Recovery:
             LostError: it is, or another, and cannot come back, or does not in time.
         """
         self._lose(loss)
+        self._await()
+
+    def replace(self, late: AnswerTimeoutError) -> None:
+        """Take providers that are alive and do not answer for lost, if they are ended then; wait for others.
+
+        Args:
+            late: what they are.
+
+        Raises:
+            AnswerTimeoutError: the same; nobody would end them.
+            LostError: see :meth:`bring_back`.
+        """
+        silent = self._session.unanswered
+        if not (self._patience.hello and all(self._session.participants[n].replaceable for n in silent)):
+            raise late
+        _log.warning("%s. It is ended", late)
+        for name in silent:
+            self._lose(LostError(str(late), name))
+        self._await()
+
+    def _await(self) -> None:
+        """Wait until nobody is absent any more."""
         while self._absent:
             try:
                 self._link.wait(lambda: bool(self._here()), FOREVER, self._look)

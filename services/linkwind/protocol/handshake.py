@@ -35,6 +35,7 @@ class Participant:
     checkpoints: int = 0  # taken so far
     saved: int = 0  # sent, as Bye says
     losses: int = 0
+    replaceable: bool = False  # whether who has started it ends it when it counts as lost, and starts another
     here: bool = False  # whether a process of it came on the bus, and its loss has not been told
     past: Past | None = None  # what it needs to come back; None if it never can
 

@@ -67,6 +67,7 @@ class Children:
 
     def start(self, name: str, arguments: Sequence[str]) -> None:
         """Start ``linkwind ARGUMENTS`` as the participant ``name``."""
+        self._session.participants[name].replaceable = True
         self._children[name] = Child(arguments, self._folder / f"{name}.log")
 
     def check(self) -> None:

@@ -77,7 +77,6 @@ class ZenohDynamicsLink(Endpoint):
         self._timeout = timeout
         self._posted_at = float("inf")
         self._waited = 0.0  # s, for the answers to the last motion
-        self._waiting_since = float("inf")  # while it is waited for them: now, less what was waited before
         self._unsure_motion = b""
         self._resend_at: float | None = None
         self._asking = threading.Lock()
@@ -120,15 +119,6 @@ class ZenohDynamicsLink(Endpoint):
         if resend_at is not None and now > resend_at:
             self._resend_at = now + 2.0 * (now - self._posted_at)
             self._outgoing.put(self._unsure_motion)
-        # Whoever is lost has not answered either, and may come back.
-        if not self._troubles and now - self._waiting_since > self._timeout:
-            late = " and ".join(f'"{name}"' for name in self._exchanging.unanswered)
-            self._fail(
-                AnswerTimeoutError(
-                    f"no Wrench from {late} for {self._exchanging.where()} within {self._timeout:g} s; it is "
-                    "alive. Is it still computing? Raise coupling.timeout, or look at its output"
-                )
-            )
 
     def wait(self, done: Callable[[], bool], timeout: float, poll: Callable[[], None]) -> bool:
         """Wait until ``done`` holds; see :class:`linkwind.bus.base.DynamicsLink`."""
@@ -171,12 +161,17 @@ class ZenohDynamicsLink(Endpoint):
         """Return the next wrench message and its provider; see :class:`~linkwind.bus.base.DynamicsLink`."""
         # A provider's time to answer runs while the dynamics waits, not while it writes its log; it does not
         # begin again when something else comes: an old answer, or that of another provider.
-        since = self._waiting_since = time.monotonic() - self._waited
-        try:
-            return _named(self._receive(SPIN))
-        finally:
-            self._waiting_since = float("inf")
+        since = time.monotonic() - self._waited
+        while self._waited < self._timeout:
+            sample = self._receive(SPIN)
             self._waited = time.monotonic() - since
+            if sample is not None:
+                return _named(sample)
+        late = " and ".join(f'"{name}"' for name in self._exchanging.unanswered)
+        raise AnswerTimeoutError(
+            f"no Wrench from {late} for {self._exchanging.where()} within {self._timeout:g} s; it is alive. "
+            "Is it still computing? Raise coupling.timeout, or look at its output"
+        )
 
     def frames(self) -> list[tuple[str, bytes]]:
         """Take the frames that have come; see :class:`~linkwind.bus.base.DynamicsLink`.

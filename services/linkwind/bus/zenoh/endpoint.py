@@ -18,6 +18,7 @@ from linkwind.errors import LinkwindError, LostError
 from linkwind.protocol import fault_error
 
 TICK = 0.1  # s between two looks of the watchdog
+WAITING = 256  # messages that may wait for the reader
 
 
 class Endpoint:
@@ -46,7 +47,7 @@ class Endpoint:
         self._wake_key = incoming.replace("*", "~wake")
         self._fault_key = f"{PREFIX}/{run}/fault"
         declare = self._session
-        self._incoming = declare.declare_subscriber(incoming, FifoChannel(256))
+        self._incoming = declare.declare_subscriber(incoming, FifoChannel(WAITING))
         self._faults = declare.declare_subscriber(
             self._fault_key, self._on_fault, allowed_origin=zenoh.Locality.REMOTE
         )
@@ -107,18 +108,24 @@ class Endpoint:
             congestion_control=zenoh.CongestionControl.DROP,
         )
 
-    def _receive(self, spin: float = 0.0) -> zenoh.Sample:
-        """Return the next message that is not empty; look for it for ``spin`` [s], then sleep."""
-        while True:
-            sample = self._look_for_sample(spin)
-            if sample is None:
-                self._reading = True
-                sample = self._incoming.recv()
-                self._reading = False
-            if self._troubles:
-                self._raise()
-            if len(sample.payload):
-                return sample
+    def _receive(self, spin: float = 0.0) -> zenoh.Sample | None:
+        """Return the next message that is not empty; look for it for ``spin`` [s], then sleep.
+
+        None, every tick, if there is none.
+        """
+        sample = self._look_for_sample(spin)
+        if sample is None:
+            self._reading = True
+            sample = self._incoming.recv()
+            self._reading = False
+        if self._troubles:
+            self._raise()
+        # Of a reader that was not given time for long, several calls to wake up may stand before a message.
+        left = WAITING
+        while sample is not None and not len(sample.payload):
+            left -= 1
+            sample = self._incoming.try_recv() if left else None
+        return sample
 
     def _look_for_sample(self, spin: float) -> zenoh.Sample | None:
         end = time.perf_counter() + spin

@@ -114,7 +114,9 @@ class ZenohProviderLink(Endpoint):
 
     def receive(self) -> bytes:
         """Return the next motion message; see :class:`~linkwind.bus.base.ProviderLink`."""
-        return self._receive().payload.to_bytes()
+        while (sample := self._receive()) is None:
+            pass
+        return sample.payload.to_bytes()
 
     def show(self, frame: bytes) -> None:
         """Send a frame to the dynamics."""
