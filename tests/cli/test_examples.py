@@ -13,7 +13,8 @@ import typer
 
 from linkwind.cli import app
 
-README = Path(__file__).parents[2] / "README.md"
+ROOT = Path(__file__).parents[2]
+GUIDES = [ROOT / "README.md", ROOT / "docker/README.md", *sorted((ROOT / "services/guide").glob("*.md"))]
 
 
 def commands(command: Any, *path: str) -> Iterator[tuple[str, Any]]:
@@ -57,12 +58,37 @@ def test_the_help_has_examples_that_can_be_typed(name):
     assert hasattr(command, "commands") or command in called
 
 
-def test_the_readme_has_examples_that_can_be_typed():
-    indented = re.findall(r"^    (linkwind .*)$", README.read_text(encoding="utf-8"), re.MULTILINE)
+def test_the_guides_have_examples_that_can_be_typed():
+    texts = [guide.read_text(encoding="utf-8") for guide in GUIDES]
+    indented = [line for text in texts for line in re.findall(r"^    (linkwind .*)$", text, re.MULTILINE)]
     typed = [line for text in indented for line in lines(text)]
-    assert len(typed) > 20
+    assert len(typed) > 40
     for line in typed:
         parse(line)
+
+
+def test_the_readme_names_every_command():
+    table = (
+        GUIDES[0].read_text(encoding="utf-8").partition("## Commands")[2].partition("Built-in scenarios")[0]
+    )
+    named = set(
+        re.findall(r"[a-z]+", " ".join(row.split("|", 2)[1] for row in table.splitlines() if "|" in row))
+    )
+    assert {name.split()[1] for name in ALL if len(name.split()) == 2} <= named
+
+
+@pytest.mark.parametrize("guide", GUIDES, ids=lambda guide: str(guide.relative_to(ROOT)))
+def test_links_lead_somewhere(guide):
+    text = guide.read_text(encoding="utf-8")
+    for link in re.findall(r"\]\(([^)]+)\)", text):
+        if link.startswith("http"):
+            continue
+        path, _, anchor = link.partition("#")
+        target = (guide.parent / path).resolve() if path else guide
+        assert target.exists(), link
+        if anchor:
+            titles = re.findall(r"^#+ (.*)$", target.read_text(encoding="utf-8"), re.MULTILINE)
+            assert anchor in {re.sub(r"[^a-z0-9 -]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
 @pytest.mark.parametrize(
