@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -10,6 +11,8 @@ from pathlib import Path
 import pytest
 
 import linkwind
+from linkwind.log.export import export_csv
+from linkwind.runs.labels import labels_of
 
 README = Path(__file__).parents[1] / "README.md"
 
@@ -34,6 +37,46 @@ def test_names_are_those_that_are_said() -> None:
         _ = linkwind.fly
     with pytest.raises(linkwind.LinkwindError, match="two_lnk"):
         linkwind.load("two_lnk")
+
+
+def test_a_run_and_what_programs_do_with_its_log(tmp_path: Path) -> None:
+    scenario = linkwind.load("two_link", ["bus.transport=inprocess", "time.end=0.05"])
+    seen: list[int] = []
+    whole = linkwind.run(scenario, tmp_path / "whole", report=False, progress=seen.append)
+    assert (whole.report, whole.as_json()["report"], seen[-1]) == (None, None, 50)
+    assert not (tmp_path / "whole" / "report.html").exists()
+    assert linkwind.verify(tmp_path / "whole").identical
+    other = linkwind.resume(
+        linkwind.open_log(whole.log),
+        tmp_path / "other",
+        from_step=20,
+        overrides=["environment.gravity=[0, 0, 0]"],
+        report=False,
+    )
+    assert linkwind.verify(str(other.log)).identical
+    falls = [linkwind.table(log)["link1.linear.y [m/s]"] for log in (whole.log, other.log)]
+    assert falls[0][:21].tolist() == falls[1][:21].tolist()
+    assert falls[0][50] < falls[1][50]
+    done = linkwind.export_fmu(scenario, str(tmp_path / "two_link.fmu"))
+    assert done.file.stat().st_size == done.bytes > 0
+
+
+def test_a_table_has_the_columns_that_are_exported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = linkwind.load("two_link", ["bus.transport=inprocess", "time.end=0.01"])
+    log = linkwind.open_log(linkwind.run(scenario, tmp_path / "run", report=False).log)
+    monkeypatch.setattr("linkwind.log.export.BLOCK", 4)  # more than one
+    for path in export_csv(log, tmp_path / "csv", labels_of(log)):
+        columns = linkwind.table(log, path.stem)
+        with path.open(encoding="utf-8") as file:
+            head, *rows = csv.reader(file)
+        assert list(columns) == head
+        for name, cells in zip(head, zip(*rows, strict=True), strict=True):
+            assert [repr(value) for value in columns[name].tolist()] == list(cells), name
+    path = log.trajectory()
+    assert linkwind.table(log)["link2.position.y [m]"].tolist() == path.position[:, 1, 1].tolist()
+    assert linkwind.table(log)["hinge.q"].tolist() == path.q[:, 3].tolist()
+    with pytest.raises(linkwind.LinkwindError, match="trajectory, steps, wrench_aero; got wrench_areo"):
+        linkwind.table(log, "wrench_areo")
 
 
 def test_runs_in_threads_beside_each_other(tmp_path: Path) -> None:

@@ -8,9 +8,11 @@ From Python, what ``linkwind run`` does, with the results as arrays::
     outcome = linkwind.run(scenario)
     path = linkwind.open_log(outcome.log).trajectory()  # path.t, path.position, path.wrench …
 
-``load`` and ``loads`` make a scenario (:mod:`linkwind.scenario`), ``run`` runs it (:mod:`linkwind.runs.run`),
-``open_log`` reads a log (:mod:`linkwind.log.reader`); all errors are ``LinkwindError``
-(:mod:`linkwind.errors`).
+``load`` and ``loads`` make a scenario (:mod:`linkwind.scenario`). ``run``, ``verify``, ``resume`` and
+``serve`` do what the commands do (:mod:`linkwind.api`), also with force models of your own: functions, or
+classes derived from ``ForceModel`` (:mod:`linkwind.aero.base`). ``open_log`` and ``table`` read a log
+(:mod:`linkwind.log.reader`), ``export_fmu`` writes an FMU (:mod:`linkwind.fmi.export`). All errors are
+``LinkwindError`` (:mod:`linkwind.errors`).
 """
 
 from importlib import import_module
@@ -20,11 +22,18 @@ __version__ = "0.1.0"
 
 # Where they are; imported when they are asked for, so that a command loads only what it needs.
 _PUBLIC = {
-    "LinkwindError": "linkwind.errors",
-    "load": "linkwind.scenario",
-    "loads": "linkwind.scenario",
-    "open_log": "linkwind.log.reader",
-    "run": "linkwind.runs.run",
+    "Capabilities": "linkwind.aero.base:Capabilities",
+    "ForceModel": "linkwind.aero.base:ForceModel",
+    "LinkwindError": "linkwind.errors:LinkwindError",
+    "export_fmu": "linkwind.fmi.export:export",
+    "load": "linkwind.scenario:load",
+    "loads": "linkwind.scenario:loads",
+    "open_log": "linkwind.log.reader:open_log",
+    "resume": "linkwind.api:resume",
+    "run": "linkwind.api:run",
+    "serve": "linkwind.api:serve",
+    "table": "linkwind.api:table",
+    "verify": "linkwind.api:verify",
 }
 __all__ = list(_PUBLIC)
 
@@ -32,7 +41,8 @@ __all__ = list(_PUBLIC)
 def __getattr__(name: str) -> Any:
     if name not in _PUBLIC:
         raise AttributeError(f"module 'linkwind' has no attribute '{name}'")
-    return getattr(import_module(_PUBLIC[name]), name)
+    module, _, attribute = _PUBLIC[name].partition(":")
+    return getattr(import_module(module), attribute)
 
 
 def __dir__() -> list[str]:

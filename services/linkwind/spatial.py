@@ -60,6 +60,16 @@ class Motion:
             views[f"{name}.angular"].reshape(-1, 3),
         )
 
+    def rotation(self) -> Array:
+        """Return rotation matrices, body to world, shape (n, 3, 3); column j is axis j of the body in W."""
+        w, x, y, z = self.orientation.T
+        rows = (
+            (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+            (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
+            (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+        )
+        return np.ascontiguousarray(np.moveaxis(np.array(rows), -1, 0))
+
     def __len__(self) -> int:
         return len(self.position)
 

@@ -28,7 +28,7 @@ def moving():
 
 
 def test_the_scenario_allows_exactly_the_registered_models():
-    assert set(typing.get_args(Provider.model_fields["model"].annotation)) == {*aero.MODELS, *aero.FROM_FILE}
+    assert set(typing.get_args(Provider.model_fields["model"].annotation)) == {*aero.MODELS, *aero.OWN}
 
 
 def test_the_wrench_is_written_whole(force_model):

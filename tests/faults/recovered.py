@@ -7,10 +7,13 @@ import os
 import signal
 import subprocess
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from random import Random
+from types import MappingProxyType
 from typing import Any
 
+from linkwind.aero import Own
 from linkwind.bus.zenoh import LEASE
 from linkwind.log.reader import open_log
 from linkwind.runs.verify import scenario_of, verify
@@ -22,14 +25,16 @@ RECOVERY = 60.0  # s
 LONG = (f"bus.recovery={RECOVERY:g}", "coupling.timeout=20", "time.end=10")  # 3 s of wall clock, 10,000 steps
 
 
-def unharmed(process: subprocess.Popen[str], log: Path) -> dict[str, Any]:
+def unharmed(
+    process: subprocess.Popen[str], log: Path, own: Mapping[str, Own] = MappingProxyType({})
+) -> dict[str, Any]:
     """Wait for a run; check that every bit of it is as if nothing had been; return its summary."""
     output, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, errors
     assert "Traceback" not in errors, errors
     summary: dict[str, Any] = json.loads(output)
     assert open_log(log).complete
-    found = verify(*scenario_of(log))
+    found = verify(*scenario_of(log), own=own)
     assert found.identical, found
     assert found.steps == summary["steps"]
     for back in summary["returns"]:

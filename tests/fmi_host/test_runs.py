@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from linkwind import aero
 from linkwind.cli import app
-from linkwind.cli.force_fmu import load_with
+from linkwind.cli.own import load_with
 from linkwind.errors import InputError, SimulationError
 from linkwind.fmi.export import export
 from linkwind.log.reader import open_log

@@ -4,7 +4,7 @@ import pkgutil
 from typing import get_args
 
 from linkwind import bus
-from linkwind.aero import FROM_FILE, MODELS
+from linkwind.aero import MODELS, OWN
 from linkwind.coupling import SCHEMES
 from linkwind.mechanism.loops import KEPT
 from linkwind.native.forces import COMPONENTS, Coefficients
@@ -24,7 +24,7 @@ def test_integrators():
 
 
 def test_aero_models():
-    assert get_args(AeroModel) == (*MODELS, *FROM_FILE)
+    assert get_args(AeroModel) == (*MODELS, *OWN)
 
 
 def test_plate_coefficients():

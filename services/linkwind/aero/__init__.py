@@ -4,7 +4,7 @@
 >>> model.commit(0.0, accepted)
 >>> model.evaluate(0.001, trial, wrench)  # fills the wrench in place
 
-``MODELS`` need nothing but the scenario; the model ``fmu`` needs a file as well.
+``MODELS`` need nothing but the scenario; the models ``fmu`` and ``python`` are the user's own.
 """
 
 from __future__ import annotations
@@ -19,10 +19,12 @@ from linkwind.aero.field import ForceField
 from linkwind.aero.flow import Flow
 from linkwind.aero.none import Vacuum
 from linkwind.aero.plate import Plate
+from linkwind.aero.python import PythonForces
+from linkwind.aero.source import PythonSource, python_source
 from linkwind.errors import InputError
 from linkwind.scenario import Provider, Scenario
 
-__all__ = ["FROM_FILE", "MODELS", "Capabilities", "ForceModel", "build", "check"]
+__all__ = ["MODELS", "OWN", "Capabilities", "ForceModel", "Own", "PythonSource", "build", "check", "own"]
 
 MODELS: dict[str, Callable[[Scenario, Provider], ForceModel]] = {
     "none": Vacuum,
@@ -31,31 +33,50 @@ MODELS: dict[str, Callable[[Scenario, Provider], ForceModel]] = {
     "flow": Flow,
 }
 
+OWN = ("fmu", "python")  # models that are made from what the user has beside the scenario
+Own = Path | PythonSource  # it: an FMU, or Python
+
 _log = logging.getLogger("linkwind")
 
-FROM_FILE = ("fmu",)  # models that are made from a file
+
+def own(model: object) -> Own:
+    """Return a model of the user's own.
+
+    Args:
+        model: ``"FILE.fmu"``, ``"FILE.py:NAME"``, or a function or class of this process (see
+            :func:`linkwind.aero.source.python_source`).
+
+    Raises:
+        InputError: it is none.
+    """
+    if isinstance(model, Path) or (isinstance(model, str) and model.endswith(".fmu")):
+        return Path(model)
+    return python_source(model)
 
 
-def build(scenario: Scenario, provider: Provider, file: Path | None = None) -> ForceModel:
+def build(scenario: Scenario, provider: Provider, own: Own | None = None) -> ForceModel:
     """Return the force model of a provider.
 
     Args:
         scenario: all of it.
         provider: the one to make the model of.
-        file: of a model from a file (``--force-fmu``).
+        own: the model itself if it is the user's own (``--force-fmu``, ``--model``).
 
     Raises:
-        InputError: the scenario does not give what the model needs, or the file is wrong.
+        InputError: the scenario does not give what the model needs, or the user's model is wrong.
         SimulationError: an FMU cannot be started.
     """
-    if provider.model in FROM_FILE:
+    if provider.model == "fmu" and not isinstance(own, PythonSource):
         from linkwind.aero.fmu import ForceFmu
 
-        return ForceFmu(scenario, provider, file)
-    if file is not None:
+        return ForceFmu(scenario, provider, own)
+    if provider.model == "python" and not isinstance(own, Path):
+        return PythonForces(scenario, provider, own)
+    if own is not None:
+        wanted = "fmu" if isinstance(own, Path) else "python"
         raise InputError(
-            f'{item(scenario, provider, "model")}: expected "fmu" for {file}; got "{provider.model}". Start '
-            f"the dynamics with --set providers.{provider.name}.model=fmu."
+            f'{item(scenario, provider, "model")}: expected "{wanted}" for {own}; got "{provider.model}". '
+            f"Start the dynamics with --set providers.{provider.name}.model={wanted}."
         )
     return MODELS[provider.model](scenario, provider)
 
@@ -67,7 +88,7 @@ def check(scenario: Scenario) -> None:
         InputError: the scenario does not give what a model needs.
     """
     for provider in scenario.providers:
-        if provider.model not in FROM_FILE:
+        if provider.model not in OWN:
             build(scenario, provider)
     for doubt in doubts(scenario):
         _log.warning("note: %s", doubt)

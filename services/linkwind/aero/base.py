@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
+from linkwind.errors import ProtocolError
 from linkwind.scenario import Provider, Scenario
 from linkwind.spatial import Motion, Wrench
 
@@ -38,6 +40,13 @@ class ForceModel(Protocol):
     The motion always holds all bodies of the scenario, the wrench those of the provider, both in the
     order of the scenario and of the provider.
 
+    To be derived from, or only to be kept to. What is derived from it and only has ``evaluate`` remembers
+    nothing and returns force and torque at the time asked for::
+
+        class Drag(linkwind.ForceModel):
+            def evaluate(self, t, motion, wrench):
+                wrench.force[:] = -0.5 * motion.linear
+
     A model whose arithmetic is in ``fmu/aero`` has it as ``forces`` (:mod:`linkwind.native.forces`), which
     is None for no force at all.
 
@@ -46,13 +55,19 @@ class ForceModel(Protocol):
     once. ``close()`` ends what the model holds, such as a process of its own.
     """
 
+    def __init__(self, scenario: Scenario, provider: Provider) -> None:
+        """Keep what the model needs of the scenario and of its provider."""
+
     @property
     def capabilities(self) -> Capabilities:
         """What the model can do."""
+        return Capabilities()
 
     def commit(self, t: float, motion: Motion) -> None:
         """Take the accepted state at time t [s]; called once a step, before ``evaluate``."""
+        return
 
+    @abstractmethod
     def evaluate(self, t: float, motion: Motion, wrench: Wrench) -> None:
         """Fill the wrench for a trial state at time t [s].
 
@@ -71,6 +86,7 @@ class ForceModel(Protocol):
         Raises:
             SimulationError: the model cannot; then a run has no checkpoints of it.
         """
+        return b""
 
     def restore(self, blob: bytes) -> None:
         """Take back the memory that ``save`` returned, in this process or another; the model may be new.
@@ -80,6 +96,10 @@ class ForceModel(Protocol):
         Raises:
             ProtocolError: the blob is not one of this model and these bodies.
         """
+        if blob:
+            raise ProtocolError(
+                f"{type(self).__name__}: expected an empty checkpoint; got {len(blob)} bytes."
+            )
 
 
 def item(scenario: Scenario, provider: Provider, *keys: str) -> str:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import logging
-from pathlib import Path
 
 from linkwind import aero
+from linkwind.aero import Own
 from linkwind.bus.base import ProviderLink
 from linkwind.errors import FaultError, LostError
 from linkwind.protocol import Model, ProviderSession, ProviderState
@@ -17,17 +17,17 @@ _log = logging.getLogger("linkwind")
 GOODBYE_TIMEOUT = 2.0  # s; a dynamics that is gone by then does not need the Bye
 
 
-def session(name: str, file: Path | None = None) -> ProviderSession:
+def session(name: str, own: Own | None = None) -> ProviderSession:
     """Return the protocol state of the provider ``name``, which takes its scenario from the dynamics.
 
     Args:
         name: of the provider.
-        file: of a model from a file, known on this side only.
+        own: its model, if that is the user's own, known on this side only.
     """
 
     def build(scenario_json: str, provider: str) -> Model:
         scenario = from_json(scenario_json)
-        return aero.build(scenario, next(p for p in scenario.providers if p.name == provider), file)
+        return aero.build(scenario, next(p for p in scenario.providers if p.name == provider), own)
 
     return ProviderSession(name, build)
 

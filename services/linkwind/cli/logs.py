@@ -5,15 +5,11 @@ from __future__ import annotations
 import json
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from linkwind.cli.options import JsonOption, LogArgument
-
-if TYPE_CHECKING:
-    from linkwind.log.reader import Log
-
 
 HELP = """Look into a log, recover or export it.
 
@@ -104,6 +100,7 @@ def export(
     from linkwind.log.export import export_csv, export_parquet
     from linkwind.log.reader import open_log
     from linkwind.log.vtk import export_vtk
+    from linkwind.runs.labels import labels_of
 
     opened = open_log(log)
     if not opened.complete:
@@ -112,19 +109,6 @@ def export(
     if format_ == Format.VTK:
         paths = export_vtk(opened, out)
     else:
-        paths = (export_csv if format_ == Format.CSV else export_parquet)(opened, out, _names(opened))
+        paths = (export_csv if format_ == Format.CSV else export_parquet)(opened, out, labels_of(opened))
     for path in paths:
         typer.echo(f"wrote {path}")
-
-
-def _names(log: Log) -> dict[str, tuple[str, ...]]:
-    """Return what numbers of joints, events and force elements are called; nothing if no scenario tells."""
-    from linkwind.errors import InputError
-    from linkwind.mechanism import build
-    from linkwind.mechanism.labels import labels
-    from linkwind.scenario import from_json
-
-    try:
-        return labels(build(from_json(log.scenario_json)))
-    except InputError:
-        return {}

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from linkwind.cli.force_fmu import ForceFmuOption
 from linkwind.cli.keys import keys
 from linkwind.cli.options import (
     ConnectOption,
@@ -20,6 +19,7 @@ from linkwind.cli.options import (
     TlsOption,
     default_endpoint,
 )
+from linkwind.cli.own import ForceFmuOption, ModelOption
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -65,6 +65,7 @@ def replay(
     ] = None,
     set_: SetOption = None,
     force_fmu: ForceFmuOption = None,
+    model: ModelOption = None,
     out: OutOption = None,
     tls: TlsOption = None,
     as_json: JsonOption = False,
@@ -77,7 +78,8 @@ def replay(
 
     With --substitute PROVIDER, that provider is asked again about the recorded motion; it is started here, or
     comes from elsewhere to --listen or --connect. With --substitute dynamics, new dynamics move under the
-    recorded forces; with --connect, dynamics elsewhere do. --set, --force-fmu, --out are for these alone.
+    recorded forces; with --connect, dynamics elsewhere do. --set, --force-fmu, --model and --out are for
+    these alone.
 
     Example: linkwind replay runs/two_link-20260101-120000/log.mcap --rate 0.5 --listen tcp/0.0.0.0:7447
 
@@ -89,10 +91,10 @@ def replay(
         from linkwind.cli.substitute import substitute as put_in_place
 
         at = (listen or [], connect or [], tls)
-        put_in_place(log, substitute, set_ or [], force_fmu or [], out, *at, as_json)
+        put_in_place(log, substitute, set_ or [], (force_fmu, model), out, *at, as_json)
         return
-    if set_ or force_fmu or out:
-        raise typer.BadParameter("expected --substitute with --set, --force-fmu and --out; got none")
+    if set_ or force_fmu or model or out:
+        raise typer.BadParameter("expected --substitute with --set, --force-fmu, --model and --out; got none")
     from linkwind.credentials import identity_in
     from linkwind.log.reader import open_log
     from linkwind.runs.playback import Steering

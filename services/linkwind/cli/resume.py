@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from linkwind.cli.force_fmu import ForceFmuOption, files_by_provider, refuse_missing
 from linkwind.cli.options import (
     ConnectOption,
     JsonOption,
@@ -18,6 +17,7 @@ from linkwind.cli.options import (
     SetOption,
     TlsOption,
 )
+from linkwind.cli.own import ForceFmuOption, ModelOption, by_provider
 from linkwind.cli.run import behind_a_bar, meeting, print_summary, tell_plan
 from linkwind.cli.view import LOCAL, HostOption, NoOpenOption, PortOption, ViewOption, watched
 from linkwind.errors import InputError
@@ -45,6 +45,7 @@ def resume(
     set_: SetOption = None,
     out: OutOption = None,
     force_fmu: ForceFmuOption = None,
+    model: ModelOption = None,
     listen: ListenOption = None,
     connect: ConnectOption = None,
     tls: TlsOption = None,
@@ -67,18 +68,16 @@ def resume(
     from linkwind.runs.resume import resume as resume_run
 
     found = plan(open_log(log), from_step, set_ or [])
-    files = files_by_provider(found.scenario, force_fmu or [])
+    own = by_provider(found.scenario, force_fmu, model)
     ends = None
     if listen or connect:
-        _refuse(files)
+        _refuse(own)
         ends = meeting(found.scenario, listen, connect, tls, quiet=as_json)
-    else:
-        refuse_missing(found.scenario, files)
 
     def job(progress: Progress) -> Resumed:
         if ends is not None:
             return resume_elsewhere(found, out, progress, ends, watch)
-        return resume_run(found, out, progress, files, tls, watch)
+        return resume_run(found, out, progress, own, tls, watch)
 
     with watched(view, host, port, no_open) as watch:
         if as_json:
@@ -88,9 +87,9 @@ def resume(
             print_summary(behind_a_bar(found.scenario.name, found.steps, job))
 
 
-def _refuse(files: dict[str, Path]) -> None:
-    if files:
+def _refuse(own: Mapping[str, object]) -> None:
+    if own:
         raise InputError(
-            "--force-fmu: expected the FMU where the provider runs, which is elsewhere with --listen or "
-            "--connect; got it here. Give it to linkwind aero there."
+            "--force-fmu, --model: expected where the provider runs, which is elsewhere with --listen or "
+            "--connect; got here. Give it to linkwind aero there."
         )

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from linkwind.cli.force_fmu import ForceFmuOption, load_with, refuse_missing
 from linkwind.cli.options import (
     ConnectOption,
     JsonOption,
@@ -20,6 +19,7 @@ from linkwind.cli.options import (
     TlsOption,
     default_endpoint,
 )
+from linkwind.cli.own import ForceFmuOption, ModelOption, load_with
 from linkwind.cli.view import LOCAL, HostOption, NoOpenOption, PortOption, ViewOption, watched
 
 if TYPE_CHECKING:
@@ -44,6 +44,7 @@ def run(
     out: OutOption = None,
     set_: SetOption = None,
     force_fmu: ForceFmuOption = None,
+    model: ModelOption = None,
     tls: TlsOption = None,
     view: ViewOption = False,
     host: HostOption = LOCAL,
@@ -54,22 +55,16 @@ def run(
     """Run a scenario: start every participant, exchange, log, report.
 
     Example: linkwind run two_link --set coupling.step=5e-4
+
+    Example: linkwind run two_link --model kite.py:Kite
     """
     from linkwind.runs.run import run as run_scenario
-    from linkwind.scenario import load
 
-    files: dict[str, Path] = {}
-    if force_fmu:
-        loaded, files, tables = load_with(scenario, set_ or [], force_fmu)
-        for table in [] if as_json else tables:
-            typer.echo(table)
-    else:
-        loaded = load(scenario, set_ or [])
-    refuse_missing(loaded, files)
+    loaded, own, tables = load_with(scenario, set_ or [], force_fmu, model)
+    for table in [] if as_json else tables:
+        typer.echo(table)
     with watched(view, host, port, no_open) as watch:
-        _show(
-            loaded, lambda progress: run_scenario(loaded, out, progress, files, tls, watch), as_json=as_json
-        )
+        _show(loaded, lambda progress: run_scenario(loaded, out, progress, own, tls, watch), as_json=as_json)
 
 
 def dynamics(
@@ -135,6 +130,7 @@ def meeting(
     def tell() -> None:
         for provider in () if quiet else scenario.providers:
             options = f"--connect {where} --name {provider.name}" + (" --tls DIR" if tls else "")
+            options += {"fmu": " --force-fmu FILE", "python": " --model FILE.py:NAME"}.get(provider.model, "")
             typer.echo(f"waiting for {provider.name}: linkwind aero {options}")
 
     return Ends(listen or [], connect or [], shown, tell)

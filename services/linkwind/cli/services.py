@@ -36,6 +36,13 @@ def aero(
     force_fmu: Annotated[
         Path | None, typer.Option(help="The FMU, for a provider whose model is fmu; its path stays here.")
     ] = None,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE.py:NAME",
+            help="The function or class, for a provider whose model is python; its path stays here.",
+        ),
+    ] = None,
     start_timeout: Annotated[
         float, typer.Option(min=0.0, help="Wait so many seconds for the dynamics.")
     ] = 60.0,
@@ -47,19 +54,25 @@ def aero(
     """Start one force provider; it takes the scenario from the dynamics.
 
     Example: linkwind aero --connect tcp/10.0.0.2:7447
+
+    Example: linkwind aero --connect tcp/10.0.0.2:7447 --model kite.py:Kite
     """
     from linkwind.aero.service import session
+    from linkwind.aero.source import python_source
     from linkwind.bus.zenoh import ZenohProviderLink
     from linkwind.credentials import identity_in
 
+    if model and force_fmu:
+        raise typer.BadParameter("expected --force-fmu or --model; got both")
     shown = identity_in(tls, name)
     if not connect and not listen:
         connect = [default_endpoint(tls)]
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     link = partial(ZenohProviderLink, connect or [], listen or [], run, name=name, identity=shown)
+    own = python_source(model) if model else force_fmu
     while True:
         try:
-            _serve(link(), session(name, force_fmu), start_timeout)
+            _serve(link(), session(name, own), start_timeout)
         except LinkwindError as error:
             if not stay:
                 raise

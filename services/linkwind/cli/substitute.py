@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from linkwind.cli.force_fmu import as_models, files_by_provider, refuse_missing, settled
+from linkwind.cli.own import Given, as_models, by_provider
 from linkwind.cli.run import behind_a_bar, print_summary
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def substitute(
     path: Path,
     live: str,
     overrides: Sequence[str],
-    given: Sequence[str],
+    given: Given,
     out: Path | None,
     listen: Sequence[str],
     connect: Sequence[str],
@@ -38,7 +38,7 @@ def substitute(
         path: of the log.
         live: the side that is live, ``dynamics`` or the name of a provider.
         overrides: ``KEY=VALUE`` settings of the live side.
-        given: ``[PROVIDER=]FILE`` of an FMU in the place of its model.
+        given: models of the user's own in the place of its model.
         out: folder for the results.
         listen: endpoints to listen on.
         connect: endpoints to connect to.
@@ -102,7 +102,7 @@ def _provider(
     log: Log,
     live: str,
     overrides: Sequence[str],
-    given: Sequence[str],
+    given: Given,
     out: Path | None,
     listen: Sequence[str],
     connect: Sequence[str],
@@ -114,16 +114,14 @@ def _provider(
     from linkwind.runs.forces import force_differences, same_answers
     from linkwind.runs.keeping import Kept
     from linkwind.runs.live_provider import live_provider
+    from linkwind.runs.own import settled
     from linkwind.runs.substitution import changed
 
     first, _ = changed(log, overrides)
-    files = files_by_provider(first, given)
-    first, changes = changed(log, [*overrides, *as_models(files)])
-    scenario, files, tables = settled(first, files)
-    changes = {step: settled(each, files)[0] for step, each in changes.items()}
-    elsewhere = bool(listen or connect)
-    if not elsewhere:
-        refuse_missing(scenario, files, [live])
+    own = by_provider(first, *given)
+    first, changes = changed(log, [*overrides, *as_models(own)])
+    scenario, tables = settled(first, own, another=True)
+    changes = {step: settled(each, own, another=True)[0] for step, each in changes.items()}
 
     def tell() -> None:
         if not as_json:
@@ -138,7 +136,7 @@ def _provider(
             changes,
             out,
             progress,
-            files=files,
+            own=own,
             listen=listen,
             connect=connect,
             tls=tls,

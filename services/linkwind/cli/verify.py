@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from linkwind.cli.force_fmu import ForceFmuOption, files_by_provider, refuse_missing
 from linkwind.cli.options import DIFFERENT, JsonOption, LogArgument, log_in
+from linkwind.cli.own import ForceFmuOption, ModelOption, by_provider
 
 if TYPE_CHECKING:
     from linkwind.log.reader import Log
@@ -33,26 +33,22 @@ def verify(
         ),
     ] = False,
     force_fmu: ForceFmuOption = None,
+    model: ModelOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Run a log again from what it contains and compare bit for bit; exit code 5 if a bit differs.
 
     Example: linkwind verify runs/two_link-20260101-120000/log.mcap
     """
-    from linkwind.log.contents import DYNAMICS, SUBSTITUTED
     from linkwind.runs.verify import changes_of, scenario_of
     from linkwind.runs.verify import verify as verify_log
 
     opened, scenario = scenario_of(log)
     steps = [scenario, *changes_of(opened).values()][-1].steps
-    files: dict[str, Path] = {}
-    live = opened.metadata.get(SUBSTITUTED)
-    if not from_recorded_wrenches and live != DYNAMICS:
-        files = files_by_provider(scenario, force_fmu or [])
-        refuse_missing(scenario, files, None if live is None else [live])
+    own = by_provider(scenario, force_fmu, model)
 
     def job(progress: Callable[[int], None]) -> Verified:
-        return verify_log(opened, scenario, progress, files, from_recorded_wrenches=from_recorded_wrenches)
+        return verify_log(opened, scenario, progress, own, from_recorded_wrenches=from_recorded_wrenches)
 
     found = job(lambda step: None) if as_json else _behind_a_bar(scenario.name, steps, job)
     if as_json:

@@ -46,7 +46,7 @@ class Exported:
 
 def export(
     scenario: Scenario,
-    out: Path,
+    out: str | Path,
     *,
     fmi: FmiVersion = "2",
     platforms: Sequence[str] = ("host",),
@@ -78,8 +78,9 @@ def export(
     portable = tuple(platforms) != ("host",)
     content |= build.binaries(sources, names, identifier, fmi, portable=portable)
     archive = _zip(content)
-    _write(out, archive)
-    return Exported(out, len(archive), fmi, tuple(names))
+    file = Path(out)
+    _write(file, archive)
+    return Exported(file, len(archive), fmi, tuple(names))
 
 
 def content_of(

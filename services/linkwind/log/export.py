@@ -8,6 +8,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 from numpy.typing import NDArray
 
 from linkwind.errors import InputError, LogError
@@ -101,12 +102,10 @@ def _export(
     Raises:
         LogError: a file exists or cannot be written, or the log has no messages.
     """
-    wrenches = {f"{contents.WRENCH}{name}": f"wrench_{name}" for name in log.provider_bodies}
-    files = {contents.STATE: "trajectory", contents.STEP: "steps"} | wrenches
     written = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for topic, name in files.items():
+        for name, topic in _topics(log).items():
             if log.topics.get(topic):
                 path = folder / f"{name}.{suffix}"
                 write(path, _blocks(log, topic, names))
@@ -118,6 +117,32 @@ def _export(
     if not written:
         raise LogError(f"{log.path}: expected messages to export; got none. The run ended before its first.")
     return written
+
+
+def table(log: Log, name: str, names: Names | None = None) -> dict[str, NDArray[Any]]:
+    """Return one of the tables as columns by title, each of shape (messages,).
+
+    Args:
+        log: to read.
+        name: ``trajectory``, ``steps`` or ``wrench_PROVIDER``.
+        names: of numbers of the trajectory; those without are numbered.
+
+    Raises:
+        LogError: there is no such table, or it has no row.
+    """
+    topics = _topics(log)
+    if name not in topics or not log.topics.get(topics[name]):
+        raise LogError(
+            f"{log.path}: expected one of its tables, {', '.join(topics)}; got {name}, or no row of it."
+        )
+    heads, columns = zip(*_blocks(log, topics[name], names or {}), strict=True)
+    return dict(zip(heads[0], map(np.concatenate, zip(*columns, strict=True)), strict=True))
+
+
+def _topics(log: Log) -> dict[str, str]:
+    """Return the topics of the tables, by name."""
+    wrenches = {f"wrench_{name}": f"{contents.WRENCH}{name}" for name in log.provider_bodies}
+    return {"trajectory": contents.STATE, "steps": contents.STEP} | wrenches
 
 
 def _blocks(log: Log, topic: str, names: Names) -> Iterator[Block]:

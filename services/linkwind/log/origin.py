@@ -12,6 +12,11 @@ from linkwind.log.reader import Log
 def origin(log: Log) -> Iterator[str]:
     """Yield what there is to be said, a sentence each: nothing for a run from beginning to end."""
     metadata = log.metadata
+    for provider in json.loads(log.scenario_json)["providers"]:
+        own = provider.get(provider["model"], {})
+        if "sha256" in own:
+            file = own.get("source", "an FMU")
+            yield f'the forces of "{provider["name"]}" come from {file} with SHA-256 {own["sha256"]}'
     record = metadata.get(contents.RECORD)
     if contents.RESUMED_STEP in metadata:
         yield f"resumed after step {metadata[contents.RESUMED_STEP]} of run {metadata['resumed_run']}"

@@ -6,12 +6,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from linkwind.aero import Own, PythonSource
 from linkwind.bus.base import DynamicsLink
 from linkwind.bus.inprocess import InProcessLink
 from linkwind.credentials import DYNAMICS, Identity, identity_in
 from linkwind.errors import InputError
 from linkwind.protocol import DynamicsSession
 from linkwind.runs.children import children
+from linkwind.runs.own import refuse_missing
 from linkwind.scenario import Scenario
 
 PORTS_TRIED = 5
@@ -22,7 +24,7 @@ def providers_here(
     session: DynamicsSession,
     scenario: Scenario,
     folder: Path,
-    files: Mapping[str, Path],
+    own: Mapping[str, Own],
     tls: Path | None = None,
 ) -> Iterator[tuple[DynamicsLink, Callable[[], None]]]:
     """Start the providers of a session, over the scenario's transport, and end them.
@@ -31,15 +33,19 @@ def providers_here(
         session: of the dynamics.
         scenario: says how.
         folder: for what the processes print.
-        files: of the providers whose model is made from a file, by name.
+        own: models of the user's own, by provider.
         tls: folder with a certificate for each participant; None without TLS.
+
+    Raises:
+        InputError: a model of the user's own is missing, or another one than the scenario says.
 
     Yields:
         The dynamics' end of the bus, to be closed; and what raises LostError once a process has ended with
         an error, or, with bus.recovery, starts it again.
     """
+    refuse_missing(scenario, own, session.providers)
     if scenario.bus.transport == "inprocess":
-        yield inprocess_link(session, files), lambda: None
+        yield inprocess_link(session, own), lambda: None
         return
     link, endpoint = _listen_here(session, scenario, tls)
     with children(folder, session) as providers:
@@ -47,17 +53,23 @@ def providers_here(
             arguments = ["aero", "--connect", endpoint, "--name", name, "--run", session.run]
             if tls:
                 arguments += ["--tls", str(tls)]
-            if name in files:
-                arguments += ["--force-fmu", str(files[name].resolve())]
+            arguments += _option(own.get(name))
             providers.start(name, [*arguments, "--start-timeout", str(scenario.bus.start_timeout)])
         yield link, providers.check
 
 
-def inprocess_link(session: DynamicsSession, files: Mapping[str, Path]) -> InProcessLink:
+def _option(own: Own | None) -> list[str]:
+    """Return how a process is told its model."""
+    if isinstance(own, PythonSource):
+        return ["--model", own.argument]
+    return ["--force-fmu", str(own.resolve())] if own else []
+
+
+def inprocess_link(session: DynamicsSession, own: Mapping[str, Own]) -> InProcessLink:
     """Return a bus whose providers are in this process."""
     from linkwind.aero.service import session as provider_session
 
-    return InProcessLink(session, [provider_session(name, files.get(name)) for name in session.providers])
+    return InProcessLink(session, [provider_session(name, own.get(name)) for name in session.providers])
 
 
 def zenoh_link(

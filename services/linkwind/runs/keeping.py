@@ -26,20 +26,25 @@ class Kept(Generic[T]):
     Attributes:
         result: of the job.
         log: the MCAP file.
-        report: the HTML page.
+        report: the HTML page; None if none was asked for.
         report_trouble: why there is no page; empty if there is one.
         log_trouble: why the log ends before the job does; empty if it does not.
     """
 
     result: T
     log: Path
-    report: Path
+    report: Path | None
     report_trouble: str
     log_trouble: str
 
 
 def keep(
-    folder: Path, link: DynamicsLink, new_log: Callable[[Path], LogWriter], job: Callable[[LogWriter], T]
+    folder: Path,
+    link: DynamicsLink,
+    new_log: Callable[[Path], LogWriter],
+    job: Callable[[LogWriter], T],
+    *,
+    report: bool = True,
 ) -> Kept[T]:
     """Do a job that writes a log, leave the bus, and write the report either way.
 
@@ -48,11 +53,12 @@ def keep(
         link: an open end of the bus; is closed.
         new_log: makes the log.
         job: writes it and closes it with how it ended; an error is recorded here.
+        report: whether there is to be one.
 
     Raises:
         LinkwindError: the job's, with the places of the files.
     """
-    log, report = folder / LOG, folder / REPORT
+    log, page = folder / LOG, folder / REPORT if report else None
     try:
         with stops_as_interrupt(), closing(link), new_log(log) as writer:
             result = job(writer)
@@ -60,8 +66,9 @@ def keep(
         if not log.exists():
             raise
         make = _report_at_once if isinstance(error, StoppedError) else _report
-        raise type(error)(f"{error}\nlog: {log}\nreport: {make(log, report) or report}") from error
-    return Kept(result, log, report, _report(log, report), writer.cut)
+        told = f"\nreport: {make(log, page) or page}" if page else ""
+        raise type(error)(f"{error}\nlog: {log}{told}") from error
+    return Kept(result, log, page, _report(log, page) if page else "", writer.cut)
 
 
 def _report(log: Path, report: Path) -> str:

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from linkwind import aero
+from linkwind.aero import Own
 from linkwind.bus.base import DynamicsLink
 from linkwind.credentials import DYNAMICS, identity_in
 from linkwind.dynamics.exchanges import Exchanges
@@ -153,7 +154,7 @@ def live_provider(
     out: Path | None,
     progress: Progress,
     *,
-    files: Mapping[str, Path] = MappingProxyType({}),
+    own: Mapping[str, Own] = MappingProxyType({}),
     listen: Sequence[str] = (),
     connect: Sequence[str] = (),
     tls: Path | None = None,
@@ -168,7 +169,7 @@ def live_provider(
         changes: scenarios that count for it after the communication point of a step, by step.
         out: folder for the results; None for a new one under ``runs/``.
         progress: is told now and then how many steps are done.
-        files: of the provider, if its model is made from a file, by name.
+        own: the model of the provider, if it is the user's own, by name.
         listen: zenoh endpoints to listen on, for a provider that comes from elsewhere.
         connect: zenoh endpoints to connect to, likewise; without any, the provider is started here.
         tls: folder with a certificate for each participant here; None without TLS.
@@ -208,5 +209,5 @@ def live_provider(
             link = zenoh_link(recorded.session, scenario, listen, connect, identity_in(tls, DYNAMICS))
         opened()
         return asked(link, lambda: None)
-    with providers_here(recorded.session, scenario, folder, files, tls) as (link, poll):
+    with providers_here(recorded.session, scenario, folder, own, tls) as (link, poll):
         return asked(link, poll)

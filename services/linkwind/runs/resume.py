@@ -16,6 +16,7 @@ from types import MappingProxyType
 from typing import Any
 
 from linkwind import aero
+from linkwind.aero import Own
 from linkwind.bus.base import DynamicsLink
 from linkwind.dynamics.published import PublishedLog
 from linkwind.dynamics.service import DynamicsService
@@ -135,9 +136,11 @@ def resume(
     found: Plan,
     out: Path | None,
     progress: Progress = lambda step: None,
-    files: Mapping[str, Path] = MappingProxyType({}),
+    own: Mapping[str, Own] = MappingProxyType({}),
     tls: Path | None = None,
     watch: Watch | None = None,
+    *,
+    report: bool = True,
 ) -> Resumed:
     """Go on with a run, with every provider on this machine.
 
@@ -145,9 +148,10 @@ def resume(
         found: where and how.
         out: folder for the results; None for a new one under ``runs/``.
         progress: is told now and then how many steps are done, those from the log included.
-        files: of the providers whose model is made from a file, by name.
+        own: models of the user's own, by provider.
         tls: folder with a certificate for each participant; None without TLS.
         watch: shows the run, and holds it; None for nobody.
+        report: make the page of the run.
 
     Raises:
         MismatchError: what was recorded does not come out again here.
@@ -155,7 +159,8 @@ def resume(
     """
     service, beginning = _continued(found)
     folder = folders.create(found.scenario.name, out)
-    return Resumed(with_providers(service, folder, progress, files, beginning, tls, watch), found)
+    done = with_providers(service, folder, progress, own, beginning, tls, watch, report=report)
+    return Resumed(done, found)
 
 
 def resume_elsewhere(

@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from linkwind import aero
+from linkwind.aero import Own
 from linkwind.bus.base import DynamicsLink
 from linkwind.credentials import Identity
 from linkwind.dynamics import methods
@@ -37,7 +38,7 @@ class Outcome:
         scenario: its name.
         result: what it came to.
         log: the MCAP file.
-        report: the HTML page.
+        report: the HTML page; None if none was asked for.
         report_trouble: why there is no page; empty if there is one.
         log_trouble: why the log ends before the run does; empty if it does not.
     """
@@ -45,7 +46,7 @@ class Outcome:
     scenario: str
     result: Result
     log: Path
-    report: Path
+    report: Path | None
     report_trouble: str = ""
     log_trouble: str = ""
 
@@ -68,7 +69,7 @@ class Outcome:
             "final_state_sha256": result.final_state_sha256,
             "log": str(self.log),
             "log_trouble": self.log_trouble or None,
-            "report": None if self.report_trouble else str(self.report),
+            "report": None if self.report_trouble or not self.report else str(self.report),
         }
 
 
@@ -118,9 +119,11 @@ def run(
     scenario: Scenario,
     out: Path | None = None,
     progress: Progress = lambda step: None,
-    files: Mapping[str, Path] = MappingProxyType({}),
+    own: Mapping[str, Own] = MappingProxyType({}),
     tls: Path | None = None,
     watch: Watch | None = None,
+    *,
+    report: bool = True,
 ) -> Outcome:
     """Run ``scenario`` with every provider on this machine.
 
@@ -128,9 +131,10 @@ def run(
         scenario: what to run.
         out: folder for the results; None for a new one under ``runs/``.
         progress: is told now and then how many steps are done.
-        files: of the providers whose model is made from a file, by name.
+        own: models of the user's own, by provider.
         tls: folder with a certificate for each participant; None without TLS.
         watch: shows the run, and holds it; None for nobody.
+        report: make the page of the run.
 
     Raises:
         LinkwindError: the run ended early; its log and report tell as well.
@@ -138,7 +142,7 @@ def run(
     mechanism = checked(scenario)
     folder = folders.create(scenario.name, out)
     service = DynamicsService(scenario, mechanism, folders.run_id(folder))
-    return with_providers(service, folder, progress, files, tls=tls, watch=watch)
+    return with_providers(service, folder, progress, own, tls=tls, watch=watch, report=report)
 
 
 def checked(scenario: Scenario) -> Mechanism:
@@ -157,14 +161,19 @@ def with_providers(
     service: DynamicsService,
     folder: Path,
     progress: Progress,
-    files: Mapping[str, Path],
+    own: Mapping[str, Own],
     beginning: Beginning = NEW,
     tls: Path | None = None,
     watch: Watch | None = None,
+    *,
+    report: bool = True,
 ) -> Outcome:
     """Run a service with every provider on this machine; see :func:`run`."""
-    with providers_here(service.session, service.scenario, folder, files, tls) as (link, poll):
-        return drive(service, folder, progress, link, poll, beginning, watch)
+    with (
+        folders.removed_if_refused(folder),
+        providers_here(service.session, service.scenario, folder, own, tls) as (link, poll),
+    ):
+        return drive(service, folder, progress, link, poll, beginning, watch, report=report)
 
 
 def dynamics(
@@ -231,6 +240,7 @@ def drive(
     watch: Watch | None = None,
     *,
     listened: bool = False,
+    report: bool = True,
 ) -> Outcome:
     """Run the service over an open end of the bus, close that, and keep the log; see :func:`run`."""
     successor = beginning.successor
@@ -253,7 +263,7 @@ def drive(
         path = path if successor is None else successor.path
         return _new_log(path, service, beginning.metadata)
 
-    kept = keep(folder, link, new_log, job)
+    kept = keep(folder, link, new_log, job, report=report)
     return Outcome(
         service.scenario.name, kept.result, kept.log, kept.report, kept.report_trouble, kept.log_trouble
     )

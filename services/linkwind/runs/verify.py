@@ -13,6 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from linkwind import schema
+from linkwind.aero import Own
 from linkwind.bus.base import DynamicsLink
 from linkwind.dynamics.march import RecordedMarch
 from linkwind.dynamics.recorder import Recorder, tables_sha256
@@ -27,6 +28,7 @@ from linkwind.native.library import library_sha256
 from linkwind.runs.comparison import Comparison
 from linkwind.runs.here import inprocess_link
 from linkwind.runs.live_provider import RecordedMotion
+from linkwind.runs.own import refuse_missing
 from linkwind.runs.recorded import DifferError, LogEndsError, RecordedWrenches
 from linkwind.scenario import Scenario, from_json
 
@@ -61,7 +63,7 @@ def verify(
     log: Log,
     scenario: Scenario,
     progress: Progress = lambda step: None,
-    files: Mapping[str, Path] = MappingProxyType({}),
+    own: Mapping[str, Own] = MappingProxyType({}),
     *,
     from_recorded_wrenches: bool = False,
 ) -> Verified:
@@ -71,18 +73,21 @@ def verify(
         log: of the run.
         scenario: of the log (:func:`scenario_of`).
         progress: is told now and then how many steps are done.
-        files: of the providers whose model is made from a file, by name.
+        own: models of the user's own, by provider.
         from_recorded_wrenches: drive the dynamics with the wrenches of the log; they are not compared.
 
     Raises:
         LogError: there is nothing to compare.
-        InputError: the log's scenario cannot be run here, or a file is missing or another one.
+        InputError: the log's scenario cannot be run here, or the user's own model is missing or another one.
         StoppedError: Ctrl-C or SIGTERM.
     """
     recorded = from_recorded_wrenches or log.metadata.get(SUBSTITUTED) == DYNAMICS
+    if not recorded:
+        live = log.metadata.get(SUBSTITUTED)
+        refuse_missing(scenario, own, list(log.provider_bodies) if live is None else [live])
     mechanism = build(scenario)
     comparison = Comparison(log, scenario, mechanism, wrenches=not recorded)
-    link, again = _again(log, scenario, mechanism, comparison, files, recorded=recorded)
+    link, again = _again(log, scenario, mechanism, comparison, own, recorded=recorded)
     remark = "" if log.complete else _why(log)
     difference: Difference | None = None
     with closing(link):
@@ -129,7 +134,7 @@ def _again(
     scenario: Scenario,
     mechanism: Mechanism,
     comparison: Comparison,
-    files: Mapping[str, Path],
+    own: Mapping[str, Own],
     *,
     recorded: bool,
 ) -> tuple[DynamicsLink, Callable[[Progress], str]]:
@@ -140,7 +145,7 @@ def _again(
         scenario: of the log.
         mechanism: of the scenario.
         comparison: takes the messages.
-        files: of the providers whose model is made from a file, by name.
+        own: models of the user's own, by provider.
         recorded: take the wrenches from the log.
     """
     live = log.metadata.get(SUBSTITUTED, DYNAMICS)
@@ -152,7 +157,7 @@ def _again(
             link: DynamicsLink = RecordedWrenches(session, log)
         else:
             session.course = replace(session.course, recovery=False)  # nobody is ever lost here
-            link = inprocess_link(session, files)
+            link = inprocess_link(session, own)
             service.march = RecordedMarch(comparison, link.providers)
         return link, lambda progress: service.run(link, recorder, progress).final_state_sha256
     if recorded:
@@ -161,7 +166,7 @@ def _again(
             f'got one of "{live}" against recorded motion. Leave the option away.'
         )
     motion = RecordedMotion(log, scenario, changes_of(log), live)
-    bus = inprocess_link(motion.session, files)
+    bus = inprocess_link(motion.session, own)
     return bus, lambda progress: motion.run(bus, comparison, progress).final_state_sha256
 
 

@@ -10,8 +10,8 @@ from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
 from linkwind.scenario.problems import ProblemError
 from linkwind.scenario.quantities import Name, Section, Vector, quantity
 
-AeroModel = Literal["none", "field", "plate", "flow", "fmu"]
-ADDING_INERTIA: tuple[AeroModel, ...] = ("plate", "flow", "fmu")  # models that may move massless bodies
+AeroModel = Literal["none", "field", "plate", "flow", "fmu", "python"]
+ADDING_INERTIA: tuple[AeroModel, ...] = ("plate", "flow", "fmu", "python")  # that may move massless bodies
 PlateCoefficients = Literal["ristroph", "andersen"]
 
 
@@ -182,6 +182,17 @@ class FmuModel(Section):
     )
 
 
+class PythonModel(Section):
+    """Which force model in Python it is. Its file is named on the command line: --model FILE.py:NAME."""
+
+    source: str | None = Field(
+        default=None, description="File, without its folder, and name in it; to accept no other name"
+    )
+    sha256: Annotated[str | None, BeforeValidator(_digest)] = Field(
+        default=None, description="SHA-256 of the file, to accept no other"
+    )
+
+
 class Provider(Section):
     """A participant that answers a motion with the wrench on its bodies."""
 
@@ -196,3 +207,4 @@ class Provider(Section):
     )
     flow: FlowModel = Field(default=FlowModel(), description="Settings of the model flow")
     fmu: FmuModel = Field(default=FmuModel(), description="Settings of the model fmu")
+    python: PythonModel = Field(default=PythonModel(), description="Settings of the model python")

@@ -1,0 +1,48 @@
+"""Force models as users write them, to be named on a command line."""
+
+import struct
+
+import numpy as np
+
+import linkwind
+from linkwind.aero.plate import Plate
+
+
+class Native(linkwind.ForceModel):
+    """The native plate, called from Python."""
+
+    capabilities = linkwind.Capabilities(added_inertia=True)
+
+    def __init__(self, scenario, provider):
+        self.plate = Plate(scenario, provider)
+
+    def evaluate(self, t, motion, wrench):
+        self.plate.evaluate(t, motion, wrench)
+
+
+def drag(t, motion, wrench):
+    wrench.force[:] = -0.5 * np.linalg.norm(motion.linear, axis=1)[:, None] * motion.linear
+
+
+class Wake(linkwind.ForceModel):
+    """A drag of what the speed was lately."""
+
+    def __init__(self, scenario, provider):
+        self.speed = 0.0
+
+    def commit(self, t, motion):
+        self.speed = 0.9 * self.speed + 0.1 * float(np.linalg.norm(motion.linear))
+
+    def evaluate(self, t, motion, wrench):
+        wrench.force[:] = -0.5 * self.speed * motion.linear
+
+    def save(self):
+        return struct.pack("<d", self.speed)
+
+    def restore(self, blob):
+        (self.speed,) = struct.unpack("<d", blob)
+
+
+def fails_later(t, motion, wrench):
+    if t > 0.0115:
+        print(1.0 / (t - t))  # line 48
