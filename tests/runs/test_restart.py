@@ -239,7 +239,7 @@ def test_resume_meets_providers_that_are_elsewhere(whole: Outcome, tmp_path: Pat
     refused = CliRunner().invoke(
         app, ["resume", str(log), "--listen", endpoint, "--force-fmu", "a.fmu"], catch_exceptions=True
     )
-    assert "expected the FMU where the provider runs" in str(refused.exception)
+    assert "expected the model where the provider runs" in str(refused.exception)
 
 
 def test_the_command_says_where_it_goes_on_and_that_it_is_over(whole: Outcome, tmp_path: Path) -> None:

@@ -90,6 +90,6 @@ def resume(
 def _refuse(own: Mapping[str, object]) -> None:
     if own:
         raise InputError(
-            "--force-fmu, --model: expected where the provider runs, which is elsewhere with --listen or "
-            "--connect; got here. Give it to linkwind aero there."
+            "--force-fmu, --model: expected the model where the provider runs, which is elsewhere with "
+            "--listen or --connect; got it here. Give it to linkwind aero there."
         )
