@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
 from mcap.reader import make_reader
 from typer.testing import CliRunner
 
@@ -17,7 +16,7 @@ from linkwind.errors import LogError
 from linkwind.log.reader import open_log
 from linkwind.log.recover import recover
 from tests.log.sample import new_writer, record
-from tests.log.test_damage import chunk_places, write_foreign
+from tests.log.test_damage import byte_at, chunk_places, flipped, flips, parts, write_foreign
 
 POINTS, PER_POINT, EVERY = 20, 5, 4
 
@@ -86,17 +85,15 @@ def test_a_chunk_that_is_not_there_any_more(logged):
     check(original[: at - 200] + original[at + size :], messages, folder)
 
 
-@given(st.data())
-def test_flipped_and_cut_anywhere(logged, data):
+@given(flips=flips, part=parts)
+def test_flipped_and_cut_anywhere(logged, flips, part):
     original, messages, folder = logged
-    damaged = bytearray(original)
-    for _ in range(data.draw(st.integers(1, 3))):
-        damaged[data.draw(st.integers(0, len(original) - 1))] ^= data.draw(st.integers(1, 255))
-    damaged = damaged[: data.draw(st.integers(len(original) // 2, len(original)))]
+    half = len(original) // 2
+    damaged = flipped(original, flips)[: half + byte_at(part, len(original) - half + 1)]
     if damaged == original:
         return
     with contextlib.suppress(LogError):
-        check(bytes(damaged), messages, folder)
+        check(damaged, messages, folder)
         return
     assert not (folder / "recovered.mcap").exists()
 
