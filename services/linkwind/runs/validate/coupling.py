@@ -1,125 +1,27 @@
-"""Coupling schemes on a single body in the plane, whose fluid is a formula: orders and bounds of stability.
+"""Coupling schemes on a single body whose fluid is a formula: orders, bounds of stability, responses.
 
-The body is the real core's; the formula stands for the providers. What is exact is worked out here apart
-from the schemes: motions in closed form, bounds from the eigenvalues of one step.
+What is exact is worked out here apart from the schemes: motions in closed form, bounds from the eigenvalues
+of one step.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from linkwind.coupling import SCHEMES, Answer, Settings
-from linkwind.dynamics.plant import MechanismPlant, State, acceleration_weight
-from linkwind.mechanism import build
+from linkwind.runs.validate import partners
+from linkwind.runs.validate.line import Body, Says, Seen
 from linkwind.runs.validate.rows import Curve, Findings, Plot, Row, near
-from linkwind.scenario import loads
-from linkwind.spatial import Array, Motion
+from linkwind.spatial import Array
 
 EXACT = "exact"
 ORDERS = {
     "explicit": ("explicit", 0, 1.0), "pec 0": ("pec", 0, 2.0), "pec 1": ("pec", 1, 2.0),
     "pec 2": ("pec", 2, 3.0), "pec 3": ("pec", 3, 4.0), "implicit 1": ("implicit", 1, 2.0),
 }  # fmt: skip
-
-
-class Seen(NamedTuple):
-    """What a fluid is asked about: time [s], x and its rate, accepted before and tried now [m, m/s]."""
-
-    t: float
-    before: tuple[float, float]
-    now: tuple[float, float]
-
-
-class Says(NamedTuple):
-    """What it answers: force along x [N], added mass [kg], minus the derivative of the force by v [N·s/m]."""
-
-    force: float
-    added: float | None = None
-    slope: float | None = None
-
-
-@dataclass(frozen=True)
-class Body:
-    """A body in the plane that moves along x, with a spring of its own that is not coupled.
-
-    Attributes:
-        mass: [kg].
-        spring: [N/m].
-        start: x [m] and its rate [m/s].
-    """
-
-    mass: float = 1.0
-    spring: float = 0.0
-    start: tuple[float, float] = (0.0, 1.0)
-
-    def fly(
-        self, fluid: Callable[[Seen], Says], h: float, steps: int, scheme: str, order: int
-    ) -> tuple[Array, Array]:
-        """Return x [m] and its rate [m/s] after each step of h [s], shape (steps + 1,) each."""
-        scenario = loads(_scene(self, h, h * steps), "validation")
-        mechanism = build(scenario)
-        plant = MechanismPlant(mechanism, scenario, lambda: "the validation")
-        states = Motion.at_rest(1), Motion.at_rest(1)
-
-        def exchange(step: int, iteration: int, accepted: State, trial: State) -> Answer:
-            ends = []
-            for state, motion in zip((accepted, trial), states, strict=True):
-                plant.multibody.motion(state.values, motion)
-                ends.append((float(motion.position[0, 0]), float(motion.linear[0, 0])))
-            return _answer(fluid(Seen(step * h, ends[0], ends[1])))
-
-        settings = Settings(acceleration_weight(mechanism), order=order, adaptive=False, tolerance=1e-13)
-        x, v = np.zeros(steps + 1), np.zeros(steps + 1)
-        for point in SCHEMES[scheme](plant, exchange, plant.initial, steps, settings):
-            plant.multibody.motion(point.state.values, states[0])
-            x[point.step], v[point.step] = states[0].position[0, 0], states[0].linear[0, 0]
-        return x, v
-
-
-def _scene(body: Body, step: float, end: float) -> str:
-    spring = f"stiffness = [{body.spring!r}, 0.0, 0.0]" if body.spring else ""
-    return f"""
-[time]
-end = {end!r}
-[environment]
-gravity = [0.0, 0.0, 0.0]
-[[bodies]]
-name = "body"
-mass = {body.mass!r}
-inertia = 1.0
-position = [{body.start[0]!r}, 0.0]
-velocity = [{body.start[1]!r}, 0.0]
-shape = {{ type = "plate", length = 1.0 }}
-[[joints]]
-name = "guide"
-type = "planar"
-parent = "world"
-child = "body"
-{spring}
-[aero]
-model = "plate"
-[coupling]
-step = {step!r}
-"""
-
-
-def _answer(says: Says) -> Answer:
-    wrench, added, slope = np.zeros((1, 6)), None, None
-    wrench[0, 0] = says.force
-    if says.added is not None:
-        added = np.zeros((1, 6, 6))
-        added[0, :3, :3] = says.added * np.eye(3)
-        added[0, 3:, 3:] = 1e-3 * says.added * np.eye(3)
-    if says.slope is not None:
-        slope = np.zeros((6, 6))
-        slope[0, 0] = says.slope
-    return Answer(wrench, added, slope)
 
 
 def orders(_short: bool) -> Findings:
@@ -252,4 +154,4 @@ def _most(case: str, quantity: str, value: float, bound: float) -> Row:
     return Row(case, quantity, value, bound, 0.0, EXACT, "most")
 
 
-CASES = {"order": orders, "bound of stability": bounds, "response": responses}
+CASES = {"order": orders, "bound of stability": bounds, "response": responses, **partners.CASES}
