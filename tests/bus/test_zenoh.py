@@ -393,6 +393,23 @@ def test_names_that_mean_something_in_a_key_are_refused(endpoint: str, name: str
             ZenohProviderLink([endpoint], [], name, name="aero")
 
 
-def test_endpoint_that_is_none_is_an_error_of_ours() -> None:
-    with pytest.raises(InputError, match=r'"foo:1": expected an endpoint, .* Did you mean tcp/foo:1\?'):
-        ZenohProviderLink(["foo:1"], [], name="aero")
+@pytest.mark.parametrize(
+    ("wrong", "meant"),
+    [
+        ("foo:1", "tcp/foo:1"),
+        ("7447", "tcp/127.0.0.1:7447"),
+        (":7448", "tcp/127.0.0.1:7448"),
+        ("foo", "tcp/foo:7447"),
+        ("tcp/foo", "tcp/foo:7447"),
+        ("tcp/foo:99999", "tcp/foo:7447"),
+        ("tcp/foo:http", "tcp/foo:7447"),
+        ("", "tcp/127.0.0.1:7447"),
+    ],
+)
+def test_endpoint_that_is_none_is_an_error_of_ours(wrong: str, meant: str) -> None:
+    with pytest.raises(InputError) as error:
+        ZenohProviderLink([wrong], [], name="aero")
+    assert str(error.value) == (
+        "expected an endpoint with protocol, address and port, such as tcp/127.0.0.1:7447; got "
+        f'"{wrong}". Did you mean {meant}?'
+    )

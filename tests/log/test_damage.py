@@ -200,7 +200,7 @@ def test_the_head_is_in_the_file_at_once(tmp_path):
     ("data", "text"),
     [
         (b"", "got an empty file"),
-        (b"time,x,y\n0,1,2\n", "got a file that starts with b'time,x,y'"),
+        (b"time,x,y\n0,1,2\n", 'got a file that starts with "time,x,y"'),
         (b"\x89MCAP0\r\n", 'expected profile "linkwind"; got ""'),
     ],
 )

@@ -60,7 +60,8 @@ def test_only_joints_that_may_be_released_have_room():
 
 
 WRONG = [
-    ([event(joint="cd")], 'events[0] "e".joint: expected one of the joints ab, bc, ac; got "cd". Use "bc".'),
+    ([event(joint="bd")], 'events[0] "e".joint: expected one of the joints ab, bc, ac; got "bd". Use one of '
+     'these.'),
     ([event(at=0.1, when="force", above=1.0)],
      'events[0] "e".at: expected a time (at) or a condition (when), not both; got at besides when. '
      "Write two events, or remove one of them."),

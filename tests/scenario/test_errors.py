@@ -161,10 +161,13 @@ WRONG = [
      'Add a table for a body, such as link1, with fx = "…".'),
     # the file
     ("[dynamics]", "[dynamics",
-     "expected valid TOML; got: Expected ']' at the end of a table declaration (at line 49, column 10). "
-     "Correct it."),
+     "expected valid TOML; got: Expected ']' at the end of a table declaration (at line 49, column 10): "
+     "[dynamics. Correct it."),
     ("[dynamics]", "[time]",
-     "expected valid TOML; got: Cannot declare ('time',) twice (at line 49, column 6). Correct it."),
+     "expected valid TOML; got: Cannot declare ('time',) twice (at line 49, column 6): [time]. Correct it."),
+    ('type = "revolute"', "type = revolute",
+     "expected valid TOML; got: Invalid value (at line 37, column 8): type = revolute. "
+     "Write text in quotes, numbers with a point and without unit."),
 ]  # fmt: skip
 
 
@@ -280,6 +283,35 @@ def test_a_source_that_does_not_exist(source, start, advice):
         load(source)
     assert str(error.value).startswith(start)
     assert str(error.value).endswith(advice)
+
+
+def test_files_of_other_commands(tmp_path):
+    (tmp_path / "robot.urdf").write_text('<robot name="r"/>')
+    (tmp_path / "log.mcap").write_bytes(b"\x89MCAP0\r\n")
+    for name, line in (
+        (
+            "robot.urdf",
+            r"expected a scenario; got XML\. Make one of a robot: linkwind mechanism import .*urdf",
+        ),
+        ("log.mcap", r"expected a scenario; got a log\. linkwind verify does its run again"),
+    ):
+        with pytest.raises(ScenarioError, match=f"{name}: {line}"):
+            load(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("text", "lines"),
+    [
+        ("", ["time: expected a value (Simulation time); got nothing. Add [time].",
+              "bodies: expected a value (The rigid bodies); got nothing. Add [[bodies]]."]),
+        ("bodies = []\ntime = { end = 1.0 }",
+         ["bodies: expected at least one entry; got []. Add an entry."]),
+    ],
+)  # fmt: skip
+def test_what_every_scenario_has(text, lines):
+    with pytest.raises(ScenarioError) as error:
+        loads(text, "x")
+    assert str(error.value).splitlines() == [f"x: {line}" for line in lines]
 
 
 def test_a_file_that_is_not_text(tmp_path):

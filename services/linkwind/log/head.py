@@ -145,7 +145,9 @@ def check_magic(path: Path) -> None:
     except OSError as error:
         raise LogError(f"{path}: expected a log; got {error.strerror}. Check the path.") from error
     if start != MAGIC:
-        got = f"a file that starts with {start!r}" if start else "an empty file"
+        line = start.split(b"\n")[0]
+        shown = f'"{line.decode()}"' if line.isascii() and line.decode().isprintable() else start.hex(" ")
+        got = f"a file that starts with {shown}" if start else "an empty file"
         raise LogError(f"{path}: expected an MCAP file; got {got}. Give the log.mcap of a linkwind run.")
 
 

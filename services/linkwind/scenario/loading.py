@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import re
 import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
@@ -50,6 +51,11 @@ def load(source: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
+        if error.object.startswith(b"\x89MCAP"):
+            raise ScenarioError(
+                f"{path}: expected a scenario; got a log. linkwind verify does its run again, linkwind "
+                "resume goes on with it."
+            ) from None
         raise ScenarioError(
             f"{path}: expected text in UTF-8; got a wrong byte at position {error.start}. Save it as UTF-8."
         ) from None
@@ -72,7 +78,13 @@ def loads(text: str, name: str, overrides: Sequence[str] = ()) -> Scenario:
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise ScenarioError(f"{name}: expected valid TOML; got: {_flat(error)}. Correct it.") from None
+        if text.lstrip().startswith("<"):
+            raise ScenarioError(
+                f"{name}: expected a scenario; got XML. Make one of a robot: linkwind mechanism import {name}"
+            ) from None
+        raise ScenarioError(
+            f"{name}: expected valid TOML; got: {_flat(error)}{_quoted(error, text)}. {_advice(error)}"
+        ) from None
     scenario = _scenario(data, name, overrides)
     scenario.called(name)
     return scenario
@@ -100,6 +112,19 @@ def template() -> str:
 
 def _flat(error: Exception) -> str:
     return " ".join(str(error).split())
+
+
+def _quoted(error: Exception, text: str) -> str:
+    """Return the line of a text in which an error is, ready to follow its message."""
+    at = re.search(r"at line (\d+)", str(error))
+    line = text.replace("\r\n", "\n").split("\n")[int(at[1]) - 1].strip() if at else ""
+    return f": {line if len(line) <= 60 else f'{line[:59]}…'}" if line else ""
+
+
+def _advice(error: Exception) -> str:
+    if re.match("Invalid value|Expected newline", str(error)):
+        return "Write text in quotes, numbers with a point and without unit."
+    return "Correct it."
 
 
 def _scenario(data: dict[str, Any], name: str, overrides: Sequence[str]) -> Scenario:

@@ -103,7 +103,7 @@ def nearest(word: str, candidates: Sequence[str]) -> str | None:
     synonym = SYNONYMS.get(word.lower())
     if synonym in candidates:
         return synonym
-    matches = get_close_matches(word.lower(), candidates, n=1, cutoff=0.5)
+    matches = get_close_matches(word.lower(), candidates, n=1, cutoff=0.55)
     return matches[0] if matches else None
 
 

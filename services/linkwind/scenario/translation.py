@@ -70,7 +70,7 @@ def _problem(detail: ErrorDetails, path: Path, model: type[BaseModel]) -> Proble
     unit = _unit(field)
     if kind == "missing":
         described = f" ({field.description})" if field else ""
-        return Problem(path, f"a value{described}", "nothing", f"Add {path[-1]}.")
+        return Problem(path, f"a value{described}", "nothing", f"Add {_header(model, path)}.")
     if kind == "union_tag_not_found":
         words = list(_kinds(_annotation(model, path)))
         return Problem((*path, "type"), f"one of {', '.join(words)}", "nothing", "Add type.")
@@ -85,13 +85,22 @@ def _problem(detail: ErrorDetails, path: Path, model: type[BaseModel]) -> Proble
         limit = detail["ctx"][key]
         return Problem(path, f"a number {words_of} {limit:g}{unit}", got, "Change the value.")
     if kind in ("too_short", "too_long"):
-        return Problem(path, "at least one entry", got, "Add an entry, or leave the key out.")
+        leave_out = "" if field is None or field.is_required() else ", or leave the key out"
+        return Problem(path, "at least one entry", got, f"Add an entry{leave_out}.")
     if kind == "string_pattern_mismatch":
         advice = "Start with a letter; go on with letters, digits and _."
         return Problem(path, "a name", got, advice)
     if kind in _KINDS:
         return Problem(path, _KINDS[kind] + unit, got, _advice(kind, detail["input"], unit))
     return Problem(path, f"a valid value ({detail['msg']})", got, "Change the value.")
+
+
+def _header(model: type[BaseModel], path: Path) -> str:
+    """Return how a file writes what is at a path: as a table, a list of tables, or a key."""
+    annotation = _annotation(model, path)
+    if _plain(annotation) is not None:
+        return f"[{path[-1]}]"
+    return f"[[{path[-1]}]]" if _plain(_entry(annotation)) is not None else str(path[-1])
 
 
 def _advice(kind: str, value: Any, unit: str) -> str:

@@ -20,6 +20,7 @@ from linkwind.errors import InputError
 
 # Of participants, as a router tells them apart: it passes on what goes from one region to another.
 DYNAMICS, PROVIDER, OBSERVER = REGIONS = ("dynamics", "provider", "observer")
+LAST_PORT = 65535
 LEASE = 1.0  # s without a sign of life after which a participant counts as lost
 
 # bytes of a message, which wait in memory until it is whole; what is larger is dropped
@@ -162,16 +163,25 @@ def _limit(message: str, key: str, size: int) -> dict[str, Any]:
 def _check_kind(endpoints: Sequence[str], security: Security | None) -> None:
     """Raise InputError unless all are endpoints, and all of TLS or none."""
     for endpoint in endpoints:
-        if not re.fullmatch(r"\w+/\S+", endpoint):
+        found = re.fullmatch(r"\w+/\S+:(\d+)([?#]\S*)?", endpoint)
+        if found is None or int(found[1]) > LAST_PORT:
             raise InputError(
-                f'"{endpoint}": expected an endpoint, such as tcp/127.0.0.1:7447; got no protocol with an '
-                f"address. Did you mean tcp/{endpoint or '127.0.0.1:7447'}?"
+                f"expected an endpoint with protocol, address and port, such as tcp/127.0.0.1:7447; got "
+                f'"{endpoint}". Did you mean {_meant(endpoint, "tls" if security else "tcp")}?'
             )
         if endpoint.startswith("tls/") != (security is not None):
             expected = "an endpoint with TLS, such as tls/10.0.0.2:7447, because of --tls"
             if security is None:
                 expected = "--tls DIR (or LINKWIND_TLS) with this endpoint, which has TLS"
             raise InputError(f"{endpoint}: expected {expected}")
+
+
+def _meant(endpoint: str, protocol: str) -> str:
+    """Return the endpoint that something like it was probably meant to be."""
+    host, _, port = endpoint.rpartition("/")[2].rpartition(":")
+    if not port.isdigit():
+        host, port = host or port, ""
+    return f"{protocol}/{host or '127.0.0.1'}:{port if port and int(port) <= LAST_PORT else 7447}"
 
 
 def key_segment(value: str, what: str) -> str:

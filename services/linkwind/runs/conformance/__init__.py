@@ -129,7 +129,7 @@ def conformance(
         try:
             life(provider, f"conformance-{number}", findings)
         except OSError as error:
-            raise InputError(f"{command[0]}: cannot be started: {error.strerror}") from error
+            raise InputError(f"{command[0]}: cannot be started: {error.strerror}. Check it.") from error
         except OverError:
             if number == 0:
                 break
