@@ -11,6 +11,7 @@ static int turns_or_slides(const lw_element *e) { return e->type == LW_ACTUATOR 
 void lw_elements_build(lw_multibody *mb, const lw_tables *t) {
     if (mb->forces) memcpy(mb->code, t->force_code, 2 * (size_t)t->instructions * sizeof(int32_t));
     if (mb->forces) memcpy(mb->constants, t->force_constants, (size_t)t->constants * sizeof(double));
+    if (mb->inputs) memcpy(mb->input, t->force_input, (size_t)t->inputs * sizeof(int32_t));
     for (int32_t i = 0; i < mb->forces; ++i) {
         lw_element *e = &mb->element[i];
         memset(e, 0, sizeof *e);
@@ -25,6 +26,10 @@ void lw_elements_build(lw_multibody *mb, const lw_tables *t) {
         if (e->type == LW_ACTUATOR) mb->link[e->link[0]].driven = 1;
         if (e->type == LW_MOTION) mb->link[e->link[0]].prescribed |= 1 << e->coordinate;
     }
+}
+
+void lw_multibody_set_inputs(lw_multibody *mb, const double *values) {
+    for (int32_t i = 0; i < mb->inputs; ++i) mb->constants[mb->input[i]] = values[i];
 }
 
 static int32_t run(const lw_multibody *mb, const lw_element *e, const double *variables, double *results,

@@ -5,10 +5,16 @@
 
 static int length(const lw_multibody *mb) { return mb->nq + mb->nv + 2; }
 
+/* The wrench at s, in units of the macro step; inputs of force elements become what they are then. */
 static const double *wrench_at(lw_run *run, double s) {
+    lw_multibody *mb = run->mb;
+    if (run->step->inputs) {
+        lw_polynomial_value(&run->wrench, s, mb->inputs, run->step->inputs, mb->given);
+        lw_multibody_set_inputs(mb, mb->given);
+    }
     if (run->wrench.count == 1) return run->step->wrenches;
-    lw_polynomial_value(&run->wrench, s, 6 * run->mb->n, run->step->wrenches, run->mb->wrench);
-    return run->mb->wrench;
+    lw_polynomial_value(&run->wrench, s, 6 * mb->n, run->step->wrenches, mb->wrench);
+    return mb->wrench;
 }
 
 static int prescribe(lw_run *run, double time, double *y) {

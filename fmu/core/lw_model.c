@@ -18,7 +18,7 @@ size_t lw_multibody_size(const lw_tables *t) {
     size_t rows = (size_t)lw_closure_row_count(t), paths = closures * n + 1; /* + 1: an even number */
     size_t events = (size_t)t->events, forces = (size_t)t->forces;
     size_t doubles = 12 * n + 2 * nv + (size_t)t->nq + (3 + LW_MAX_STAGES) * vector_length(t->nq, t->nv);
-    doubles += rows * nv + 2 * rows * rows + 4 * rows + 6 * closures + 2 * events;
+    doubles += rows * nv + 2 * rows * rows + 4 * rows + 6 * closures + 2 * events + 2 * (size_t)t->inputs;
     return sizeof(lw_multibody) + n * (sizeof(lw_link) + sizeof(lw_spatial)) + forces * sizeof(lw_element) +
            closures * sizeof(lw_closure) + rows * sizeof(lw_row) + events * sizeof(lw_event) +
            (doubles + (size_t)t->constants + (size_t)t->instructions) * sizeof(double) + paths / 2 * 2 * sizeof(int32_t);
@@ -51,6 +51,8 @@ static void lay_out(lw_multibody *mb, int32_t constants, int32_t instructions) {
     mb->rest = next, next += mb->nq;
     mb->constants = next, next += constants;
     mb->code = (int32_t *)next, next += instructions; /* two to a double */
+    mb->input = (int32_t *)next, next += mb->inputs;
+    mb->given = next, next += mb->inputs;
     mb->wrench = next, next += 6 * n;
     mb->y = next, next += length;
     mb->trial = next, next += length;
@@ -135,6 +137,7 @@ int lw_multibody_init(lw_multibody *mb, const lw_tables *t, lw_fault *fault) {
     mb->nv = t->nv;
     mb->formulation = NULL;
     mb->forces = t->forces;
+    mb->inputs = t->inputs;
     mb->closures = t->closures;
     mb->events = t->events;
     mb->rows = lw_closure_row_count(t);

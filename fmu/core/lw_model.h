@@ -110,6 +110,8 @@ struct lw_multibody {
     double time; /* of the present evaluation [s] */
     int32_t *code;     /* programs of force elements, and what they push */
     double *constants;
+    int32_t inputs, *input; /* (inputs) which of the constants they are */
+    double *given;          /* (inputs) room */
     lw_element *element; /* forces */
     lw_spatial *load;    /* n: force and torque of all elements on each link, in W at the COM */
     int32_t closures, rows, events;

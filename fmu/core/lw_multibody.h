@@ -56,7 +56,7 @@ enum { LW_FORCE_TYPES = 5 };
  * coordinates than its type needs. Coordinates that no joint uses keep their value. Closures are joints
  * that close loops of the tree. */
 typedef struct {
-    int32_t n, nq, nv, closures, events, forces, instructions, constants;
+    int32_t n, nq, nv, closures, events, forces, instructions, constants, inputs;
     const int32_t *parent;         /* (n) index of the parent body, -1 = world */
     const int32_t *order;          /* (n) the bodies, every parent before its children */
     const int32_t *joint_type;     /* (n) lw_joint_type */
@@ -93,6 +93,7 @@ typedef struct {
     const int32_t *force_start;  /* (forces + 1) first instruction of each program, which may be empty */
     const int32_t *force_code;   /* (instructions,2) as lw_expression.h */
     const double *force_constants; /* (constants) */
+    const int32_t *force_input;    /* (inputs) constants that may be set from outside: lw_multibody_set_inputs */
 } lw_tables;
 
 /* 0 is success; `lw_fault` names the item and the time. */
@@ -151,7 +152,8 @@ typedef enum {
     LW_BAD_FORCE_BODY,
     LW_BAD_FORCE_POINT,
     LW_BAD_FORCE_NUMBER,
-    LW_BAD_FORCE_START
+    LW_BAD_FORCE_START,
+    LW_BAD_FORCE_INPUT
 } lw_status;
 
 typedef struct {
@@ -192,9 +194,14 @@ typedef struct {
     lw_fault *fault;             /* out, if the status is not 0 */
     double *memory;              /* lw_radau5_size(nq,nv) doubles of the caller's, for the time of the call; or
                                     NULL, for all integrators but radau5 */
+    const double *inputs;        /* (count,inputs) of force elements, at the nodes, as the wrench; or NULL: as they
+                                    were set last */
 } lw_macro_step;
 
 LW_API size_t lw_radau5_size(int32_t nq, int32_t nv);
+
+/* Set the inputs of force elements, values (inputs); at first they are the constants of the tables. */
+LW_API void lw_multibody_set_inputs(lw_multibody *multibody, const double *values);
 
 LW_API int lw_multibody_advance(lw_multibody *multibody, const lw_macro_step *step);
 

@@ -161,7 +161,7 @@ int lw_tables_check(const lw_tables *t, lw_fault *fault) {
     fault->item = 0;
     fault->time = 0.0;
     if (t->n < 1 || t->nq < 0 || t->nv < 0 || t->closures < 0 || t->events < 0 || t->forces < 0 ||
-        t->instructions < 0 || t->constants < 0)
+        t->instructions < 0 || t->constants < 0 || t->inputs < 0)
         return LW_BAD_COUNT;
     if (!all_finite(t->gravity, 3)) return LW_BAD_GRAVITY;
     int status = check_coordinate_values(t, fault);
@@ -179,6 +179,10 @@ int lw_tables_check(const lw_tables *t, lw_fault *fault) {
     }
     for (int i = 0; i < t->forces && !status; ++i) {
         status = check_force(t, i);
+        fault->item = i;
+    }
+    for (int i = 0; i < t->inputs && !status; ++i) {
+        if (t->force_input[i] < 0 || t->force_input[i] >= t->constants) status = LW_BAD_FORCE_INPUT;
         fault->item = i;
     }
     return status;

@@ -132,7 +132,7 @@ int lw_get_output_derivatives(lw_instance *instance, const uint32_t *references,
     for (size_t i = 0; i < n; ++i) {
         const lw_fmu_variable *v = lw_variable(instance, references[i]);
         if (!v) return LW_FMI_ERROR;
-        if (v->type == LW_TYPE_INT32 || orders[i] < 1 || orders[i] > lw_part_output_order())
+        if (v->type > LW_TYPE_FLOAT64 || orders[i] < 1 || orders[i] > lw_part_output_order())
             return lw_report(instance, LW_FMI_ERROR,
                              "%s: Expected a Float64 and an order of 1, at most %d, but was %d.", v->name,
                              lw_part_output_order(), orders[i]);

@@ -110,6 +110,20 @@ fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t
     return (fmi2Status)lw_set_int32(instance, vr, nvr, value, nvr);
 }
 
+fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Boolean value[]) {
+    ENTER(GET);
+    int status = lw_check_booleans(instance, vr, nvr, value, nvr, 0);
+    for (size_t i = 0; !status && i < nvr; ++i) value[i] = lw_get_boolean(instance, vr[i]);
+    return (fmi2Status)status;
+}
+
+fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Boolean value[]) {
+    ENTER(SET);
+    int status = lw_check_booleans(instance, vr, nvr, value, nvr, 1);
+    for (size_t i = 0; !status && i < nvr; ++i) lw_set_boolean(instance, vr[i], value[i]);
+    return (fmi2Status)status;
+}
+
 /* There are no variables of the other types; a list without any is fine. */
 #define NO_VARIABLES(type)                                                                                   \
     fmi2Status fmi2Get##type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,                     \
@@ -124,7 +138,6 @@ fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t
         (void)vr, (void)value;                                                                               \
         return nvr ? unsupported(instance, "a model without " #type " variables") : fmi2OK;                  \
     }
-NO_VARIABLES(Boolean)
 NO_VARIABLES(String)
 
 /* ---- state ---- */

@@ -149,6 +149,22 @@ fmi3Status fmi3SetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t nv
     return (fmi3Status)lw_set_int32(instance, vr, nvr, values, n);
 }
 
+fmi3Status fmi3GetBoolean(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, fmi3Boolean values[],
+                          size_t n) {
+    ENTER(GET);
+    int status = lw_check_booleans(instance, vr, nvr, values, n, 0);
+    for (size_t i = 0; !status && i < nvr; ++i) values[i] = lw_get_boolean(instance, vr[i]);
+    return (fmi3Status)status;
+}
+
+fmi3Status fmi3SetBoolean(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, const fmi3Boolean values[],
+                          size_t n) {
+    ENTER(SET);
+    int status = lw_check_booleans(instance, vr, nvr, values, n, 1);
+    for (size_t i = 0; !status && i < nvr; ++i) lw_set_boolean(instance, vr[i], values[i]);
+    return (fmi3Status)status;
+}
+
 /* There are no variables of the other types; a list without any is fine. */
 #define NO_VARIABLES(function, unused, ...)                                                                  \
     fmi3Status function(fmi3Instance c, const fmi3ValueReference vr[], size_t nvr, __VA_ARGS__) {            \
@@ -167,7 +183,6 @@ NO_ACCESS(UInt16)
 NO_ACCESS(UInt32)
 NO_ACCESS(Int64)
 NO_ACCESS(UInt64)
-NO_ACCESS(Boolean)
 NO_ACCESS(String)
 NO_VARIABLES(fmi3GetBinary, ((void)sizes, (void)values, (void)n), size_t sizes[], fmi3Binary values[],
              size_t n)

@@ -17,7 +17,8 @@
 #define LW_DYNAMICS_KNOWN(X)                                                                             \
     X(MASS, n) X(INERTIA, 6 * n) X(PARENT_POINT, 3 * n) X(CHILD_POINT, 3 * n) X(GRAVITY, 3)              \
     X(STIFFNESS, nv) X(DAMPING, nv) X(REST, nq) X(FORCE_NUMBER, 3 * lw_fmu_forces) X(RTOL, 1) X(ATOL, 1) \
-    X(FORCE, 3 * n) X(TORQUE, 3 * n) X(ADDED_INERTIA, 36 * n)                                            \
+    X(FORCE, 3 * n) X(TORQUE, 3 * n) X(FORCE_INPUT, lw_fmu_inputs) X(ADDED_INERTIA, 36 * n)              \
+    X(EVENT_COMMAND, lw_fmu_events)                                                                      \
     X(Q, nq) X(V, nv)
 #define LW_DYNAMICS_CALCULATED(X)                                                                        \
     X(DER_Q, nq) X(DER_V, nv)                                                                            \
@@ -44,12 +45,15 @@ enum {
 };
 enum { LW_AERO_KNOWN(LW_ENUMERATE_AERO) LW_AERO_CALCULATED(LW_ENUMERATE_AERO) LW_AERO_SECTIONS };
 
-enum { LW_TYPE_TIME, LW_TYPE_FLOAT64, LW_TYPE_INT32 };
+enum { LW_TYPE_TIME, LW_TYPE_FLOAT64, LW_TYPE_INT32, LW_TYPE_BOOLEAN }; /* Booleans lie among the Float64, 0 or 1 */
 enum { LW_INTEGRATOR, LW_SUBSTEPS, LW_INTEGERS }; /* the Int32 values, an array of their own */
 
 /* When a variable may be set: fixed parameters and start values of states until the end of initialisation,
- * tunable parameters also between steps (Model Exchange: in events), inputs always. */
-enum { LW_FIXED_PARAMETER, LW_TUNABLE_PARAMETER, LW_INPUT, LW_STATE, LW_CALCULATED, LW_INDEPENDENT };
+ * tunable parameters also between steps (Model Exchange: in events), inputs always; discrete ones count from the
+ * next step or event on (the standards would have them set in events; importers do so at any time). */
+enum {
+    LW_FIXED_PARAMETER, LW_TUNABLE_PARAMETER, LW_INPUT, LW_DISCRETE_INPUT, LW_STATE, LW_CALCULATED, LW_INDEPENDENT
+};
 
 typedef struct {
     const char *name;  /* as in modelDescription.xml, for messages */
@@ -82,6 +86,7 @@ extern const int32_t lw_fmu_forces, lw_fmu_force_type[], lw_fmu_force_body[];
 extern const double lw_fmu_force_point[];
 extern const int32_t lw_fmu_instructions, lw_fmu_constants, lw_fmu_force_start[], lw_fmu_force_code[];
 extern const double lw_fmu_force_constants[];
+extern const int32_t lw_fmu_inputs, lw_fmu_force_input[];
 
 /* ---- aero ---- */
 enum { LW_AERO_PLATE, LW_AERO_FIELD };

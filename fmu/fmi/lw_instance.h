@@ -80,6 +80,11 @@ int lw_get_float64(lw_instance *, const uint32_t *references, size_t n, double *
 int lw_set_float64(lw_instance *, const uint32_t *references, size_t n, const double *values, size_t count);
 int lw_get_int32(lw_instance *, const uint32_t *references, size_t n, int32_t *values, size_t count);
 int lw_set_int32(lw_instance *, const uint32_t *references, size_t n, const int32_t *values, size_t count);
+/* May n Booleans be read, or written? The environment's arrays differ: one value by one. */
+int lw_check_booleans(const lw_instance *, const uint32_t *references, size_t n, const void *values, size_t count,
+                      int writing);
+int lw_get_boolean(const lw_instance *, uint32_t reference);
+void lw_set_boolean(lw_instance *, uint32_t reference, int value);
 int lw_check_results(const lw_instance *, const double *derivatives, size_t count); /* finite? */
 /* Bring groups of calculated values up to date. */
 int lw_update(lw_instance *, unsigned groups);

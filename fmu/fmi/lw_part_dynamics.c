@@ -12,11 +12,13 @@ enum { RATE = 1, MOTION = 2, ACCELERATION = 4, ENERGY = 8, EVENTS = 16 }; /* gro
 static const double drifted = 1e-9;  /* m, rad: loops that are open by more are closed in an event */
 static const double slack = 1e-9;    /* of an indicator that a solver has found the zero of */
 static const double not_yet = -1.0;  /* time of an event */
+static const double ordered = -2.0;  /* of one that shall happen as soon as possible */
 
 struct lw_part {
     uint32_t first[LW_DYNAMICS_SECTIONS + 1];
     lw_multibody *multibody;
-    double *state, *wrench, *stages; /* stages: memory of radau5, if it is there */
+    double *state, *wrench, *inputs; /* the last two at the nodes of a polynomial */
+    double *stages;                  /* memory of radau5, if it is there */
     lw_evaluation out;
     const double *added; /* added inertia, NULL where it is zero */
 };
@@ -45,10 +47,15 @@ size_t lw_part_values(void) {
 
 static size_t forces(void) { return 6 * (size_t)lw_fmu_n; }
 
-/* When each event happened comes last in the memory. */
-static size_t rates_end(void) { return RATES + MAX_ORDER * forces(); }
+/* Inputs that are polynomials in time: forces and torques, and those of force elements. */
+static size_t varying(void) { return forces() + (size_t)lw_fmu_inputs; }
 
-size_t lw_part_memory(void) { return rates_end() + (size_t)lw_fmu_events; }
+/* When each event happened, and what its command was then, come last in the memory. */
+static size_t rates_end(void) { return RATES + MAX_ORDER * varying(); }
+static double *event_times(const lw_instance *instance) { return instance->store + rates_end(); }
+static double *past_commands(const lw_instance *instance) { return event_times(instance) + lw_fmu_events; }
+
+size_t lw_part_memory(void) { return rates_end() + 2 * (size_t)lw_fmu_events; }
 
 /* What of the mechanism is constant. */
 static lw_tables constants(void) {
@@ -64,6 +71,7 @@ static lw_tables constants(void) {
         .force_body = lw_fmu_force_body, .force_point = lw_fmu_force_point,
         .instructions = lw_fmu_instructions, .constants = lw_fmu_constants, .force_start = lw_fmu_force_start,
         .force_code = lw_fmu_force_code, .force_constants = lw_fmu_force_constants,
+        .inputs = lw_fmu_inputs, .force_input = lw_fmu_force_input,
         .events = lw_fmu_events, .event_joint = lw_fmu_event_joint, .event_action = lw_fmu_event_action,
         .event_occasion = lw_fmu_event_occasion, .event_side = lw_fmu_event_side,
         .event_threshold = lw_fmu_event_threshold, .event_restitution = lw_fmu_event_restitution};
@@ -72,7 +80,8 @@ static lw_tables constants(void) {
 
 size_t lw_part_size(void) {
     lw_tables tables = constants();
-    size_t doubles = lw_state_size() + 1 + (size_t)lw_fmu_events + (MAX_ORDER + 1 + 3) * forces() + (size_t)lw_fmu_nv;
+    size_t doubles = lw_state_size() + 1 + (size_t)lw_fmu_events + (MAX_ORDER + 1) * varying() + 3 * forces();
+    doubles += (size_t)lw_fmu_nv;
     doubles += 6 * (size_t)lw_fmu_closures + 2 * (size_t)lw_fmu_forces + lw_radau5_size(lw_fmu_nq, lw_fmu_nv);
     return (sizeof(lw_part) + 7) / 8 * 8 + doubles * sizeof(double) + (lw_multibody_size(&tables) + 7) / 8 * 8;
 }
@@ -87,6 +96,7 @@ void lw_part_create(lw_instance *instance) {
     double *next = (double *)(void *)((char *)part + (sizeof *part + 7) / 8 * 8);
     part->state = next, next += lw_state_size() + 1 + (size_t)lw_fmu_events;
     part->wrench = next, next += (MAX_ORDER + 1) * forces();
+    part->inputs = next, next += (MAX_ORDER + 1) * lw_fmu_inputs;
     part->out.acceleration = next, next += forces();
     part->out.reaction = next, next += forces();
     part->out.total_wrench = next, next += forces();
@@ -99,8 +109,8 @@ void lw_part_create(lw_instance *instance) {
 }
 
 void lw_part_restart(lw_instance *instance) {
-    memset(instance->store, 0, rates_end() * sizeof(double));
-    for (int32_t i = 0; i < lw_fmu_events; ++i) instance->store[rates_end() + i] = not_yet;
+    memset(instance->store, 0, lw_part_memory() * sizeof(double));
+    for (int32_t i = 0; i < lw_fmu_events; ++i) event_times(instance)[i] = not_yet;
 }
 
 uint32_t lw_part_first(const lw_instance *instance, unsigned section) {
@@ -189,21 +199,28 @@ static double input_at(const lw_instance *instance, size_t i, double dt) {
     const double *rate = instance->store + RATES + i;
     int order = (int)instance->store[ORDER];
     double value = AT(FORCE)[i], factor = 1.0;
-    for (int k = 1; k <= order; ++k, rate += forces()) {
+    for (int k = 1; k <= order; ++k, rate += varying()) {
         factor *= dt / k;
         value += factor * *rate;
     }
     return value;
 }
 
-/* Forces and torques as the core takes them: (n, 6). */
-static void pack_wrench(const lw_instance *instance, double dt, double *wrench) {
+/* Forces and torques, (n, 6), and inputs of force elements, as the core takes them. */
+static void pack(const lw_instance *instance, double dt, double *wrench, double *inputs) {
     size_t torque = 3 * (size_t)lw_fmu_n;
+    for (size_t i = forces(); i < varying(); ++i) *inputs++ = input_at(instance, i, dt);
     for (size_t i = 0; i < torque; i += 3, wrench += 6)
         for (size_t axis = 0; axis < 3; ++axis) {
             wrench[axis] = input_at(instance, i + axis, dt);
             wrench[3 + axis] = input_at(instance, torque + i + axis, dt);
         }
+}
+
+static void take_inputs(const lw_instance *instance) {
+    lw_part *part = instance->part;
+    pack(instance, 0.0, part->wrench, part->inputs);
+    lw_multibody_set_inputs(part->multibody, part->inputs);
 }
 
 /* Where the added inertia is, if it is not zero. */
@@ -220,8 +237,8 @@ static const double *find_added(lw_instance *instance) {
 int lw_part_set_input_derivative(lw_instance *instance, uint32_t index, int32_t order, double value) {
     uint32_t first = FIRST(FORCE);
     double *memory = instance->store;
-    if (index - first >= forces()) return 0;
-    memory[RATES + (size_t)(order - 1) * forces() + (index - first)] = value;
+    if (index - first >= varying()) return 0;
+    memory[RATES + (size_t)(order - 1) * varying() + (index - first)] = value;
     if (order > memory[ORDER]) memory[ORDER] = order;
     return 1;
 }
@@ -247,15 +264,14 @@ static void load_state(lw_instance *instance) {
     lw_part *part = instance->part;
     memcpy(part->state, AT(Q), lw_state_size() * sizeof(double));
     part->state[lw_state_size()] = instance->store[PROPOSED];
-    memcpy(part->state + lw_state_size() + 1, instance->store + rates_end(),
-           (size_t)lw_fmu_events * sizeof(double));
+    memcpy(part->state + lw_state_size() + 1, event_times(instance), (size_t)lw_fmu_events * sizeof(double));
 }
 
 static void store_state(lw_instance *instance) {
     const double *state = instance->part->state;
     memcpy(AT(Q), state, lw_state_size() * sizeof(double));
     instance->store[PROPOSED] = state[lw_state_size()];
-    memcpy(instance->store + rates_end(), state + lw_state_size() + 1, (size_t)lw_fmu_events * sizeof(double));
+    memcpy(event_times(instance), state + lw_state_size() + 1, (size_t)lw_fmu_events * sizeof(double));
 }
 
 static void split(int32_t count, const double *six, double *linear, double *angular) {
@@ -268,7 +284,7 @@ static void split(int32_t count, const double *six, double *linear, double *angu
 static int update_acceleration(lw_instance *instance) {
     lw_part *part = instance->part;
     lw_fault fault;
-    pack_wrench(instance, 0.0, part->wrench);
+    take_inputs(instance);
     int status = lw_multibody_evaluate(part->multibody, part->state, instance->time, part->wrench,
                                        find_added(instance),
                                        &part->out, &fault);
@@ -286,9 +302,9 @@ static int update_events(lw_instance *instance) {
     lw_part *part = instance->part;
     lw_fault fault;
     size_t bytes = (size_t)lw_fmu_events * sizeof(double);
-    memcpy(AT(EVENT_TIME), instance->store + rates_end(), bytes);
+    memcpy(AT(EVENT_TIME), event_times(instance), bytes);
     if (!lw_fmu_events) return LW_FMI_OK;
-    pack_wrench(instance, 0.0, part->wrench);
+    take_inputs(instance);
     int status = lw_multibody_indicators(part->multibody, part->state, instance->time, part->wrench,
                                          find_added(instance), AT(EVENT_INDICATOR), &fault);
     return status ? discard(instance, status, &fault) : LW_FMI_OK;
@@ -329,6 +345,19 @@ int lw_part_rate(unsigned number) {
     }
 }
 
+/* ---- commands ---- */
+
+/* Events whose command has become true, if they have not happened yet: as soon as possible. */
+static void order_events(lw_instance *instance) {
+    double *time = instance->part->state + lw_state_size() + 1;
+    for (int32_t i = 0; i < lw_fmu_events; ++i)
+        if (AT(EVENT_COMMAND)[i] > past_commands(instance)[i] && time[i] == not_yet) time[i] = ordered;
+}
+
+static void remember_commands(lw_instance *instance) {
+    memcpy(past_commands(instance), AT(EVENT_COMMAND), (size_t)lw_fmu_events * sizeof(double));
+}
+
 /* ---- steps ---- */
 
 /* Equal substeps under a held wrench are steps of their own; the others are one. */
@@ -350,12 +379,14 @@ int lw_part_advance(lw_instance *instance, double h, int32_t pieces) {
     int order = (int)instance->store[ORDER];
     lw_fault fault = {0, 0.0};
     load_state(instance);
+    order_events(instance);
     for (int i = 0; i <= order; ++i) {
         if (order) nodes[i] = (double)i / order;
-        pack_wrench(instance, nodes[i] * h, part->wrench + (size_t)i * forces());
+        pack(instance, nodes[i] * h, part->wrench + (size_t)i * forces(), part->inputs + i * lw_fmu_inputs);
     }
     lw_macro_step step = {
-        .state = part->state, .h = h, .time = snapped(instance->time), .nodes = nodes, .wrenches = part->wrench, .count = order + 1,
+        .state = part->state, .h = h, .time = snapped(instance->time),
+        .nodes = nodes, .wrenches = part->wrench, .inputs = lw_fmu_inputs ? part->inputs : NULL, .count = order + 1,
         .added_inertia = find_added(instance), .integrator = instance->integers[LW_INTEGRATOR],
         .substeps = pieces > 1 ? 1 : instance->integers[LW_SUBSTEPS],
         .rtol = *AT(RTOL), .atol = *AT(ATOL),
@@ -364,6 +395,7 @@ int lw_part_advance(lw_instance *instance, double h, int32_t pieces) {
     int status = lw_multibody_advance(part->multibody, &step);
     if (status) return discard(instance, status, &fault);
     store_state(instance);
+    remember_commands(instance);
     if (order) memset(instance->store + ORDER, 0, (rates_end() - ORDER) * sizeof(double));
     return LW_FMI_OK;
 }
@@ -394,20 +426,22 @@ int lw_part_event(lw_instance *instance, int *changed, double *next) {
     lw_fault fault;
     int status = LW_OK;
     load_state(instance);
-    pack_wrench(instance, 0.0, part->wrench);
+    order_events(instance);
+    take_inputs(instance);
     if (lw_fmu_events)
         status = lw_multibody_happen(part->multibody, part->state, instance->time, slack, part->wrench,
                                      find_added(instance), &fault);
     if (!status && part->multibody->rows) status = lw_multibody_close(part->multibody, part->state, &fault);
     if (status) return discard(instance, status, &fault);
     *changed = memcmp(AT(Q), part->state, lw_state_size() * sizeof(double)) != 0 ||
-               memcmp(instance->store + rates_end(), part->state + lw_state_size() + 1,
+               memcmp(event_times(instance), part->state + lw_state_size() + 1,
                       (size_t)lw_fmu_events * sizeof(double)) != 0;
     store_state(instance);
+    remember_commands(instance);
     instance->stale |= LW_STALE_ALL & ~LW_STALE_INPUTS;
     *next = HUGE_VAL;
     for (int32_t i = 0; i < lw_fmu_events; ++i)
-        if (lw_fmu_event_occasion[i] == LW_ON_TIME && !(instance->store[rates_end() + i] >= 0.0))
+        if (lw_fmu_event_occasion[i] == LW_ON_TIME && !(event_times(instance)[i] >= 0.0))
             *next = fmin(*next, lw_fmu_event_threshold[i]);
     return LW_FMI_OK;
 }
@@ -448,6 +482,7 @@ double lw_part_scale(const lw_instance *instance, const lw_fmu_variable *variabl
     case LW_DYNAMICS_INERTIA:
         if (place % 6 > 2) scale = resistance(instance, place / 6, 3);
         break;
+    case LW_DYNAMICS_FORCE_INPUT: return fmax(1.0, size);
     case LW_DYNAMICS_ADDED_INERTIA:
         scale = sqrt(resistance(instance, body, place % 36 / 6) * resistance(instance, body, place % 6));
         break;

@@ -21,23 +21,24 @@ const char *lw_name_at(int type, uint32_t index) {
     return "a constant of the model";
 }
 
-/* The variable, if it is of the type. */
-static const lw_fmu_variable *typed(const lw_instance *instance, uint32_t reference, int integer) {
+/* The variable, if it is of the type; time is a Float64. */
+static const lw_fmu_variable *typed(const lw_instance *instance, uint32_t reference, int type) {
+    static const char *const names[] = {"Float64", "Float64", "Int32", "Boolean"};
     const lw_fmu_variable *v = lw_variable(instance, reference);
-    if (!v || (v->type == LW_TYPE_INT32) == integer) return v;
-    lw_report(instance, LW_FMI_ERROR, "%s: Expected a variable of type %s but was %s.", v->name,
-              integer ? "Int32" : "Float64", integer ? "Float64" : "Int32");
+    if (!v || (v->type == LW_TYPE_TIME ? LW_TYPE_FLOAT64 : v->type) == type) return v;
+    lw_report(instance, LW_FMI_ERROR, "%s: Expected a variable of type %s but was %s.", v->name, names[type],
+              names[v->type]);
     return NULL;
 }
 
 /* Do the references name `count` values of the type? For writing: that may be set now? */
 static int check(const lw_instance *instance, const uint32_t *references, size_t n, const void *values,
-                 size_t count, int integer, int writing) {
+                 size_t count, int type, int writing) {
     size_t found = 0;
     if (n && !references) return lw_missing(instance, "valueReferences");
     if (count && !values) return lw_missing(instance, "values");
     for (size_t i = 0; i < n; ++i) {
-        const lw_fmu_variable *v = typed(instance, references[i], integer);
+        const lw_fmu_variable *v = typed(instance, references[i], type);
         if (!v) return LW_FMI_ERROR;
         if (writing && !(lw_settable[v->causality] & instance->mode))
             return lw_report(instance, LW_FMI_ERROR,
@@ -81,7 +82,7 @@ int lw_check_results(const lw_instance *instance, const double *values, size_t c
 int lw_get_float64(lw_instance *instance, const uint32_t *references, size_t n, double *values,
                    size_t count) {
     unsigned groups = 0;
-    int status = check(instance, references, n, values, count, 0, 0);
+    int status = check(instance, references, n, values, count, LW_TYPE_FLOAT64, 0);
     if (status) return status;
     for (size_t i = 0; i < n; ++i) {
         const lw_fmu_variable *v = &lw_fmu_variables[references[i]];
@@ -114,7 +115,7 @@ static int check_finite(const lw_instance *instance, const uint32_t *references,
 
 int lw_set_float64(lw_instance *instance, const uint32_t *references, size_t n, const double *values,
                    size_t count) {
-    int status = check(instance, references, n, values, count, 0, 1);
+    int status = check(instance, references, n, values, count, LW_TYPE_FLOAT64, 1);
     if (status || (status = check_finite(instance, references, values, count))) return status;
     for (size_t i = 0; i < n; ++i) {
         const lw_fmu_variable *v = &lw_fmu_variables[references[i]];
@@ -129,7 +130,7 @@ int lw_set_float64(lw_instance *instance, const uint32_t *references, size_t n, 
 /* ---- Int32 ---- */
 
 int lw_get_int32(lw_instance *instance, const uint32_t *references, size_t n, int32_t *values, size_t count) {
-    int status = check(instance, references, n, values, count, 1, 0);
+    int status = check(instance, references, n, values, count, LW_TYPE_INT32, 0);
     for (size_t i = 0; !status && i < n; ++i)
         values[i] = instance->integers[lw_fmu_variables[references[i]].offset];
     return status;
@@ -137,13 +138,29 @@ int lw_get_int32(lw_instance *instance, const uint32_t *references, size_t n, in
 
 int lw_set_int32(lw_instance *instance, const uint32_t *references, size_t n, const int32_t *values,
                  size_t count) {
-    int status = check(instance, references, n, values, count, 1, 1);
+    int status = check(instance, references, n, values, count, LW_TYPE_INT32, 1);
     for (size_t i = 0; !status && i < n; ++i) {
         instance->integers[lw_fmu_variables[references[i]].offset] = values[i];
         instance->unconfigured = 1;
         instance->stale = LW_STALE_ALL;
     }
     return status;
+}
+
+/* ---- Boolean ---- */
+
+int lw_check_booleans(const lw_instance *instance, const uint32_t *references, size_t n, const void *values,
+                      size_t count, int writing) {
+    return check(instance, references, n, values, count, LW_TYPE_BOOLEAN, writing);
+}
+
+int lw_get_boolean(const lw_instance *instance, uint32_t reference) {
+    return instance->values[lw_fmu_variables[reference].offset] != 0.0;
+}
+
+/* Nothing is calculated from it. */
+void lw_set_boolean(lw_instance *instance, uint32_t reference, int value) {
+    instance->values[lw_fmu_variables[reference].offset] = value ? 1.0 : 0.0;
 }
 
 /* ---- continuous states ---- */

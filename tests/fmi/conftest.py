@@ -10,7 +10,7 @@ import pytest
 from linkwind.fmi.export import Exported, content_of, export
 from linkwind.fmi.part import EXPORTABLE
 from linkwind.scenario import builtin_names, load
-from tests.fmi.scenes import eventful, spatial
+from tests.fmi.scenes import eventful, servo, spatial
 
 # part, version of FMI, arrays
 FORMS = [
@@ -19,12 +19,17 @@ FORMS = [
     for fmi, arrays in (("2", "native"), ("3", "native"), ("3", "scalar"))
 ]
 # A flow is not exported, and the mechanisms in one are those of the others.
-SCENARIOS = ("spatial", "eventful", *(n for n in builtin_names() if load(n).providers[0].model in EXPORTABLE))
+SCENARIOS = (
+    "spatial",
+    "eventful",
+    "servo",
+    *(n for n in builtin_names() if load(n).providers[0].model in EXPORTABLE),
+)
 
 
 @cache
 def scenario(name: str):
-    own = {"spatial": spatial, "eventful": eventful}
+    own = {"spatial": spatial, "eventful": eventful, "servo": servo}
     return own[name]() if name in own else load(name)
 
 

@@ -230,3 +230,86 @@ fy = "-0.1*vy"
 def eventful() -> Scenario:
     """A four-bar that drops something at a time, and a ball that bounces."""
     return loads(EVENTFUL, "eventful.toml")
+
+
+SERVO = """
+[time]
+end = 0.4
+[[bodies]]
+name = "upper"
+mass = 1.2
+inertia = 0.05
+angle_deg = -60.0
+[[bodies]]
+name = "lower"
+mass = 0.8
+inertia = 0.03
+angle_deg = -20.0
+[[bodies]]
+name = "load"
+mass = 0.3
+inertia = 0.002
+angle_deg = 10.0
+[[joints]]
+name = "shoulder"
+type = "revolute"
+parent = "world"
+child = "upper"
+child_point = [-0.3, 0.0]
+[[joints]]
+name = "elbow"
+type = "revolute"
+parent = "upper"
+child = "lower"
+parent_point = [0.3, 0.0]
+child_point = [-0.25, 0.0]
+[[joints]]
+name = "grip"
+type = "revolute"
+parent = "lower"
+child = "load"
+parent_point = [0.25, 0.0]
+child_point = [-0.05, 0.0]
+damping = 0.01
+[[events]]
+name = "brake"
+joint = "elbow"
+action = "lock"
+[[events]]
+name = "drop"
+joint = "grip"
+action = "release"
+[[forces]]
+name = "motor"
+type = "actuator"
+joint = "shoulder"
+inputs = { u = 0.0 }
+force = "u - 0.05*v"
+[[forces]]
+name = "spring"
+type = "actuator"
+joint = "elbow"
+inputs = { target = 0.4, gain = 2.0 }
+force = "gain*sin(target - q) - 0.1*v"
+[[forces]]
+name = "jet"
+type = "point_force"
+body = "lower"
+point = [0.1, 0.0]
+frame = "body"
+inputs = { throttle = 0.5 }
+fy = "throttle*cos(3*t)"
+[aero]
+model = "field"
+[aero.field.load]
+fx = "-0.1*vx"
+fy = "-0.1*vy"
+[coupling]
+scheme = "explicit"
+step = 1e-3
+"""
+
+
+def servo() -> Scenario:
+    """An arm with a motor, a controlled elbow and a jet, that brakes and drops its load on command."""
+    return loads(SERVO, "servo.toml")

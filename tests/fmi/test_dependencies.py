@@ -89,7 +89,8 @@ def changes(probe: Probe, known: int, unknowns: list[int]) -> dict[int, tuple[np
 @pytest.mark.parametrize(
     ("name", "part", "tag"),
     [("spatial", "dynamics", "Output"), ("spatial", "dynamics", "ContinuousStateDerivative"),
-     ("spatial", "dynamics", "InitialUnknown"), ("two_link_free", "dynamics", "InitialUnknown"),
+     ("spatial", "dynamics", "InitialUnknown"), ("servo", "dynamics", "Output"),
+     ("servo", "dynamics", "ContinuousStateDerivative"), ("two_link_free", "dynamics", "InitialUnknown"),
      ("two_link", "aero", "InitialUnknown"), ("two_link_gust", "aero", "Output")],
 )  # fmt: skip
 def test_nothing_depends_on_more_than_is_stated(fmu, probe, name, part, tag):

@@ -73,10 +73,17 @@ def test_check_finds_nothing_and_references_are_met_to_the_last_bit(fmu, part, f
 
 
 @pytest.mark.parametrize(
-    ("name", "part"), [("spatial", "dynamics"), ("spatial", "aero"), ("two_link_gust", "aero")]
+    ("name", "part", "fmi"),
+    [
+        ("spatial", "dynamics", "3"),
+        ("spatial", "aero", "3"),
+        ("two_link_gust", "aero", "3"),
+        ("servo", "dynamics", "2"),
+        ("servo", "dynamics", "3"),
+    ],
 )
-def test_references_of_other_models(fmu, name, part):
-    assert reference_error(fmu(name, "3", part)) == 0.0
+def test_references_of_other_models(fmu, name, part, fmi):
+    assert reference_error(fmu(name, fmi, part)) == 0.0
 
 
 def test_check_notices_wrong_references(fmu, tmp_path):

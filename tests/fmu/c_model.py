@@ -35,17 +35,19 @@ KNOWN = {
     "ATOL",
     "FORCE",
     "TORQUE",
+    "FORCE_INPUT",
     "ADDED_INERTIA",
+    "EVENT_COMMAND",
     "Q",
     "V",
 }
 INPUTS = {
-    "dynamics": {"FORCE", "TORQUE", "ADDED_INERTIA"},
+    "dynamics": {"FORCE", "TORQUE", "FORCE_INPUT", "ADDED_INERTIA"},
     "aero": {"POSITION", "ORIENTATION", "LINEAR", "ANGULAR"},
 }
 INTEGERS = (
     "closure_body", "closure_rows", "event_joint", "event_action", "event_occasion", "event_side",
-    "force_type", "force_body", "force_start", "force_code",
+    "force_type", "force_body", "force_start", "force_code", "force_input",
 )  # fmt: skip
 FIXED = {"PARENT_POINT", "CHILD_POINT"}
 
@@ -78,6 +80,8 @@ def _causality(part: str, section: str, calculated: set[str]) -> str:
         return "LW_CALCULATED"
     if section in INPUTS[part]:
         return "LW_INPUT"
+    if section == "EVENT_COMMAND":
+        return "LW_DISCRETE_INPUT"
     if part == "dynamics" and section in ("Q", "V"):
         return "LW_STATE"
     return "LW_FIXED_PARAMETER" if section in FIXED else "LW_TUNABLE_PARAMETER"
@@ -86,8 +90,9 @@ def _causality(part: str, section: str, calculated: set[str]) -> str:
 def _model(part, sections, start, calculated, integers, constants, scalar, token=TOKEN) -> Model:
     rows, references, offset = ['{"time", LW_TYPE_TIME, LW_INDEPENDENT, 0, 0, 1}'], {}, 0
     for name, size in sections.items():
-        head = f"LW_TYPE_FLOAT64, {_causality(part, name, calculated)}, LW_{part.upper()}_{name}"
-        pieces = [(f"{name}[{k}]", k, 1) for k in range(size)] if scalar else [(name, 0, size)][: size > 0]
+        kind, single = ("BOOLEAN", True) if name == "EVENT_COMMAND" else ("FLOAT64", scalar)
+        head = f"LW_TYPE_{kind}, {_causality(part, name, calculated)}, LW_{part.upper()}_{name}"
+        pieces = [(f"{name}[{k}]", k, 1) for k in range(size)] if single else [(name, 0, size)][: size > 0]
         references[name] = list(range(len(rows), len(rows) + len(pieces)))
         rows += [f'{{"{label}", {head}, {offset + at}, {count}}}' for label, at, count in pieces]
         offset += size
@@ -107,7 +112,7 @@ def _model(part, sections, start, calculated, integers, constants, scalar, token
 def dynamics(tables: Tables, q0, v0, *, integrator=2, substeps=1, scalar=False, token=TOKEN) -> Model:
     """Return the FMU of a mechanism."""
     n, nq, nv, closures = len(tables.parent), len(q0), len(v0), len(tables.closure_rows)
-    forces = len(tables.force_type)
+    forces, inputs = len(tables.force_type), len(tables.force_input)
     events = len(tables.event_joint)
     sections = {
         "MASS": n,
@@ -123,7 +128,9 @@ def dynamics(tables: Tables, q0, v0, *, integrator=2, substeps=1, scalar=False, 
         "ATOL": 1,
         "FORCE": 3 * n,
         "TORQUE": 3 * n,
+        "FORCE_INPUT": inputs,
         "ADDED_INERTIA": 36 * n,
+        "EVENT_COMMAND": events,
         "Q": nq,
         "V": nv,
         "DER_Q": nq,
@@ -146,10 +153,11 @@ def dynamics(tables: Tables, q0, v0, *, integrator=2, substeps=1, scalar=False, 
         "POTENTIAL_ENERGY": 1,
     }
     start = {name: getattr(tables, name.lower()) for name in sections if hasattr(tables, name.lower())}
+    start["FORCE_INPUT"] = tables.force_constants[tables.force_input]
     start |= {"RTOL": 1e-6, "ATOL": 1e-9, "Q": q0, "V": v0}
     constants = f"const int32_t lw_fmu_n = {n}, lw_fmu_nq = {nq}, lw_fmu_nv = {nv};\n"
     constants += f"const int32_t lw_fmu_closures = {closures}, lw_fmu_forces = {forces};\n"
-    constants += f"const int32_t lw_fmu_events = {events};\n"
+    constants += f"const int32_t lw_fmu_events = {events}, lw_fmu_inputs = {inputs};\n"
     constants += f"const int32_t lw_fmu_instructions = {len(tables.force_code)};\n"
     constants += f"const int32_t lw_fmu_constants = {len(tables.force_constants)};\n"
     for name in ("parent", "order", "joint_type", "q_index", "v_index", *INTEGERS):
@@ -372,6 +380,17 @@ class Instance:
     def set_integer(self, name: str, value: int) -> int:
         vrs, data = self.vrs(name), np.array([value], dtype=np.int32)
         return self.call("SetInt32", pointer(vrs), ctypes.c_size_t(1), pointer(data), ctypes.c_size_t(1))
+
+    def try_command(self, values) -> int:
+        vrs, data = self.vrs("EVENT_COMMAND"), np.array(values, dtype=np.bool_)
+        size = ctypes.c_size_t
+        return self.call("SetBoolean", pointer(vrs), size(len(vrs)), pointer(data), size(data.size))
+
+    def commands(self) -> list[bool]:
+        vrs, data = self.vrs("EVENT_COMMAND"), np.zeros(self.size("EVENT_COMMAND"), dtype=np.bool_)
+        size = ctypes.c_size_t
+        self.do("GetBoolean", pointer(vrs), size(len(vrs)), pointer(data), size(data.size))
+        return data.tolist()
 
     def try_step(self, point: float, size: float) -> tuple[int, bool, float]:
         flags_, last = (ctypes.c_bool * 3)(), ctypes.c_double()

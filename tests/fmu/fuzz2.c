@@ -71,6 +71,16 @@ static fmi2Status integers(slot *s) {
     return status;
 }
 
+static fmi2Status booleans(slot *s) {
+    list l = references(LW_TYPE_BOOLEAN);
+    int *values = malloc(l.n * sizeof *values + 1);
+    for (size_t i = 0; i < l.n; ++i) values[i] = pick(2);
+    fmi2Status status = fmi2SetBoolean(s->c, l.vr, l.n, pick(50) ? values : NULL);
+    if (pick(2)) status = fmi2GetBoolean(s->c, l.vr, l.n, values);
+    free(values), free(l.vr);
+    return status;
+}
+
 static fmi2Status step(slot *s) {
     double now = 0.0, size = pick(10) ? 1e-3 * (1 + pick(5)) : number();
     fmi2ValueReference time = 0;
@@ -170,7 +180,7 @@ static fmi2Status nothing(slot *s) {
 
 #define CALLS(X)                                                                                          \
     X(instantiate) X(release) X(setup) X(initialize) X(initialized) X(terminate) X(reset) X(get) X(set)    \
-    X(integers) X(step) X(state_get) X(state_set) X(state_free) X(bytes) X(derivative) X(time_derivative)  \
+    X(integers) X(booleans) X(step) X(state_get) X(state_set) X(state_free) X(bytes) X(derivative) X(time_derivative)  \
     X(status_of_step) X(event) X(continuous) X(completed) X(set_time) X(states) X(nothing)
 #define ENTRY(name) {#name, name, {0}},
 static struct {
@@ -185,7 +195,7 @@ int main(int count, char **arguments) {
     random_state = strtoull(arguments[1], NULL, 10) * 0x9e3779b97f4a7c15u + 1;
     for (long k = strtol(arguments[2], NULL, 10); k > 0; --k) {
         slot *s = &slots[pick(SLOTS)];
-        unsigned which = !s->c ? 0 : pick(3) ? 7 + pick(4) : pick(COUNT);
+        unsigned which = !s->c ? 0 : pick(3) ? 7 + pick(5) : pick(COUNT);
         fmi2Status status = calls[which].call(s);
         if (status > fmi2Error) abort();
         ++calls[which].outcomes[status];

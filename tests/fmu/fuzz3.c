@@ -107,6 +107,16 @@ static fmi3Status integers(slot *s) {
     return status;
 }
 
+static fmi3Status booleans(slot *s) {
+    list l = references(LW_TYPE_BOOLEAN);
+    bool *values = malloc(l.count * sizeof *values + 1);
+    for (size_t i = 0; i < l.count; ++i) values[i] = pick(2);
+    fmi3Status status = fmi3SetBoolean(s->c, l.vr, l.n, pick(50) ? values : NULL, l.count);
+    if (pick(2)) status = fmi3GetBoolean(s->c, l.vr, l.n, values, l.count);
+    free(values), free(l.vr);
+    return status;
+}
+
 static fmi3Status step(slot *s) {
     bool a, b, c;
     double last, point = pick(10) ? now() : number(), size = pick(10) ? 1e-3 * (1 + pick(5)) : number();
@@ -198,7 +208,7 @@ static fmi3Status nothing(slot *s) {
 
 #define CALLS(X)                                                                                          \
     X(instantiate) X(release) X(initialize) X(initialized) X(terminate) X(reset)                           \
-    X(get) X(set) X(integers) X(step) X(state_get) X(state_set) X(state_free) X(bytes) X(derivative)       \
+    X(get) X(set) X(integers) X(booleans) X(step) X(state_get) X(state_set) X(state_free) X(bytes) X(derivative)       \
     X(output_derivative) X(event) X(continuous) X(discrete) X(completed) X(set_time) X(states) X(nothing)
 #define ENTRY(name) {#name, name, {0}},
 static struct {
@@ -219,7 +229,7 @@ static unsigned char *image(slot *s, size_t *size) {
 
 static void one_call(void) {
     slot *s = inside ? current : &slots[pick(SLOTS)];
-    unsigned which = !s->c ? 0 : pick(3) ? 6 + pick(4) : pick(COUNT); /* get, set, integers, step: most of life */
+    unsigned which = !s->c ? 0 : pick(3) ? 6 + pick(5) : pick(COUNT); /* get, set, integers, booleans, step: most of life */
     size_t size = 0, same = 0;
     unsigned char *was = s->c && !inside ? image(s, &size) : NULL, *is = NULL;
     current = s;

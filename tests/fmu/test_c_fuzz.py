@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 
 from linkwind.aero.field import field_table, initial_angles
+from linkwind.mechanism import build
 from linkwind.scenario import loads
+from tests.fmi.scenes import servo
 from tests.fmu.c_model import Compiler, aero, build_hook, dynamics
 from tests.fmu.conftest import spatial_mechanism
 from tests.fmu.test_c_aero import FIELD
@@ -48,7 +50,8 @@ def run(program: Path, version: int, seed: int) -> dict[str, list[int]]:
 
 
 def models():
-    """A mechanism and a force model in FMI 3, and the mechanism with scalar variables in FMI 2."""
+    """Mechanisms and a force model in FMI 3, and the mechanisms with scalar variables in FMI 2."""
+    arm = build(servo())
     scenario = loads(FIELD, "field")
     provider = scenario.providers[0]
     field = aero(field_table(scenario, provider), initial_angles(scenario, provider))
@@ -56,10 +59,12 @@ def models():
         "dynamics_3": dynamics(*spatial_mechanism()),
         "aero_3": field,
         "dynamics_2": dynamics(*spatial_mechanism(), scalar=True),
+        "servo_3": dynamics(arm.tables, arm.q0, arm.v0),
+        "servo_2": dynamics(arm.tables, arm.q0, arm.v0, scalar=True),
     }
 
 
-@pytest.mark.parametrize("name", ["dynamics_3", "aero_3", "dynamics_2"])
+@pytest.mark.parametrize("name", ["dynamics_3", "aero_3", "dynamics_2", "servo_3", "servo_2"])
 def test_random_calls(sanitized, name):
     version = int(name[-1])
     program = sanitized.program(models()[name], version, f"fuzz_{name}", HERE / f"fuzz{version}.c")

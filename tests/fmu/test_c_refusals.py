@@ -275,12 +275,14 @@ def test_what_the_model_does_not_have(running):
         "UInt32",
         "Int64",
         "UInt64",
-        "Boolean",
         "String",
     ):
         for verb in ("Get", "Set"):
             refused(running, running.call(verb + name, pointer(one), size(1), pointer(values), size(1)))
             running.do(verb + name, None, size(0), None, size(0))
+    for verb in ("Get", "Set"):
+        refused(running, running.call(f"{verb}Boolean", pointer(one), size(1), pointer(values), size(1)))
+        running.do(f"{verb}Boolean", None, size(0), None, size(0))
     for name in ("GetClock", "SetClock", "GetBinary", "SetBinary", "GetIntervalDecimal", "SetShiftDecimal"):
         refused(running, running.call(name, pointer(one), size(1), pointer(values), pointer(values), size(1)))
     for name in (

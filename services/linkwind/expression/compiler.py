@@ -39,10 +39,11 @@ _SHIFTED = (Operation.CONSTANT, Operation.TABLE)
 
 @dataclass(frozen=True)
 class Program:
-    """Instructions (operation, operand) and the constants that they push."""
+    """Instructions (operation, operand), and the constants that they push: the first are inputs."""
 
     code: tuple[tuple[Operation, int], ...]
     constants: tuple[float, ...]
+    inputs: int = 0
 
     def shifted(self, places: int) -> list[tuple[int, int]]:
         """Return the code for constants that stand ``places`` further on."""
@@ -56,6 +57,7 @@ def compile_program(
     *,
     variables: Sequence[str],
     components: Sequence[str],
+    inputs: Mapping[str, float] | None = None,
 ) -> Program:
     """Return the program that gives some results.
 
@@ -65,11 +67,16 @@ def compile_program(
         item: where they stand, for errors: ``two_link.toml: aero.field.link1``.
         variables: names that expressions may use, in the order that the program is given them.
         components: names of all results, in the order that the program numbers them.
+        inputs: names and values of constants that may be set from outside; expressions may use them.
 
     Raises:
-        ExpressionError: a name or an expression is wrong.
+        ExpressionError: a name or an expression is wrong, or an input of no use.
     """
-    compiler = _Compiler(variables, defines=let is not None)
+    inputs = inputs or {}
+    for name in inputs:
+        _check_name(name, f"{item}.inputs", variables)
+    variables = (*variables, *inputs)
+    compiler = _Compiler(variables, inputs, defines=let is not None)
     for name, text in (let or {}).items():
         here = f"{item}.let.{name}"
         _check_name(name, here, variables)
@@ -81,7 +88,13 @@ def compile_program(
         else:
             compiler.compile(law, f"{item}.{component}")
         compiler.emit(Operation.RESULT, components.index(component))
-    return Program(tuple(compiler.code), tuple(compiler.constants))
+    for name, place in compiler.inputs.items():
+        if (Operation.CONSTANT, place) not in compiler.code:
+            raise ExpressionError(
+                f'{item}.inputs: expected names that an expression uses; got "{name}", which none does. Use '
+                "it, or remove it."
+            )
+    return Program(tuple(compiler.code), tuple(compiler.constants), len(inputs))
 
 
 def _check_name(name: str, item: str, variables: Sequence[str]) -> None:
@@ -97,11 +110,12 @@ def _check_name(name: str, item: str, variables: Sequence[str]) -> None:
 class _Compiler:
     """Emits postfix code for syntax trees, and watches the machine's limits."""
 
-    def __init__(self, variables: Sequence[str], *, defines: bool) -> None:
+    def __init__(self, variables: Sequence[str], inputs: Mapping[str, float], *, defines: bool) -> None:
         self._variables = variables
         self._defines = defines
+        self.inputs = {name: place for place, name in enumerate(inputs)}
         self.code: list[tuple[Operation, int]] = []
-        self.constants: list[float] = []
+        self.constants: list[float] = list(inputs.values())
         self.locals: dict[str, int] = {}
         self._source = Source("0", "")
 
@@ -166,15 +180,18 @@ class _Compiler:
         return self._constant(number)
 
     def _constant(self, number: float) -> int:
-        if number not in self.constants:
+        fixed = len(self.inputs)
+        if number not in self.constants[fixed:]:
             self.constants.append(number)
-        self.emit(Operation.CONSTANT, self.constants.index(number))
+        self.emit(Operation.CONSTANT, self.constants.index(number, fixed))
         return 1
 
     def _name(self, node: ast.Name) -> int:
         name = node.id
         if name in self.locals:
             self.emit(Operation.LOCAL, self.locals[name])
+        elif name in self.inputs:
+            self.emit(Operation.CONSTANT, self.inputs[name])
         elif name in self._variables:
             self.emit(Operation.VARIABLE, self._variables.index(name))
         elif name in CONSTANTS:

@@ -52,7 +52,13 @@ def _variables(part: Part) -> Iterator[str]:
         else:
             section = f"LW_{part.name.upper()}_{variable.section}"
             offset = first[variable.section] + variable.offset
-            fields = ["LW_TYPE_FLOAT64", _causality(variable), section, str(offset), str(variable.size)]
+            fields = [
+                f"LW_TYPE_{variable.type.upper()}",
+                _causality(variable),
+                section,
+                str(offset),
+                str(variable.size),
+            ]
         yield f'    {{"{variable.name}", {", ".join(fields)}}},'
 
 
@@ -60,7 +66,7 @@ def _causality(variable: Variable) -> str:
     if variable.causality == "parameter":
         return f"LW_{variable.variability.upper()}_PARAMETER"
     if variable.causality == "input":
-        return "LW_INPUT"
+        return "LW_DISCRETE_INPUT" if variable.variability == "discrete" else "LW_INPUT"
     return "LW_STATE" if variable.initial == "exact" else "LW_CALCULATED"
 
 

@@ -12,7 +12,7 @@ from typing import Literal
 
 from linkwind import __version__
 from linkwind.fmi.part import Part
-from linkwind.fmi.units import COUNT, Quantity, Unit
+from linkwind.fmi.units import COUNT, SWITCH, Quantity, Unit
 from linkwind.fmi.variables import Dependence, Variable
 
 FmiVersion = Literal["2", "3"]
@@ -22,6 +22,7 @@ LOG_CATEGORIES = {
     "logStatusDiscard": "Calls that return Discard: a step that cannot be done",
     "logStatusError": "Calls that return Error: wrong use, values that make no sense",
 }
+TYPES_2 = {"Float64": "Real", "Int32": "Integer", "Boolean": "Boolean"}  # names of types in FMI 2
 # A list of dependencies that is longer is left out, which means "on everything": quadratic in the bodies.
 INDICATOR = "EVENT_INDICATOR"
 LONGEST_LIST = 500
@@ -151,7 +152,7 @@ def _units(root: ET.Element, quantities: Iterable[Quantity]) -> None:
 def _types(root: ET.Element, quantities: Iterable[Quantity], version: FmiVersion) -> None:
     definitions = ET.SubElement(root, "TypeDefinitions")
     for quantity in sorted(quantities, key=lambda entry: entry.name):
-        if quantity is COUNT:  # of integers, which have no type of their own
+        if quantity in (COUNT, SWITCH):  # of integers and Booleans, which have no type of their own
             continue
         about = {"quantity": quantity.name}
         if quantity.unit:
@@ -181,6 +182,8 @@ def _typed(variable: Variable) -> dict[str, str]:
     if variable.limits:
         least, most = variable.limits
         return {"min": str(least), "max": str(most), "start": str(int(variable.start[0]))}
+    if variable.boolean:
+        return {"start": _boolean(variable.start != (0.0,))}
     found = {"declaredType": variable.quantity.name}
     if variable.quantity.unit:
         found["unit"] = variable.quantity.unit.name
@@ -194,7 +197,7 @@ def _scalar_variable(parent: ET.Element, at: int, variable: Variable, index: dic
     typed = _typed(variable)
     if variable.derivative_of:
         typed["derivative"] = str(index[variable.derivative_of] + 1)
-    ET.SubElement(element, "Integer" if variable.integer else "Real", typed)
+    ET.SubElement(element, TYPES_2[variable.type], typed)
 
 
 def _variable(parent: ET.Element, at: int, variable: Variable, index: dict[str, int]) -> None:
@@ -203,7 +206,7 @@ def _variable(parent: ET.Element, at: int, variable: Variable, index: dict[str, 
         attributes["derivative"] = str(index[variable.derivative_of])
     if variable.causality == "output" and variable.variability == "continuous":
         attributes["intermediateUpdate"] = "true"
-    element = ET.SubElement(parent, "Int32" if variable.integer else "Float64", attributes)
+    element = ET.SubElement(parent, variable.type, attributes)
     for length in variable.dimensions:
         ET.SubElement(element, "Dimension", start=str(length))
 

@@ -32,13 +32,25 @@ algorithm
 proportional to
 the number of bodies.</p>
 <h2>Time steps</h2>
-<p>Co-Simulation: inputs are held over a communication step, unless their derivatives are given (FMI 2).
-The step
+<p>Co-Simulation: inputs are held over a communication step, unless their derivatives are given (FMI 2; of
+added
+inertia and commands there are none). The step
 is taken by <code>solver.integrator</code> (0 Euler, 1 semi-implicit Euler, 2 Runge–Kutta of order 4, 3
 Dormand–Prince
 with the tolerances <code>solver.rtol</code> and <code>solver.atol</code>) in
-<code>solver.substeps</code> equal parts.
-Model Exchange: the states are all q and v; there are no events.</p>
+<code>solver.substeps</code> equal parts. Model Exchange: the states are all q and v.</p>
+<h2>Events</h2>
+<p>Joints may be released, locked or stopped, at a time, on a condition or on command. Co-Simulation finds
+the time
+within its steps, Model Exchange has an event indicator for each. An event on command happens when its
+Boolean input
+<code>….command</code> becomes true, from false or at the start: at the beginning of the next communication
+step, or
+in Event Mode. It happens once; <code>….time</code> tells when, −1 that it has not.</p>
+<h2>Force elements</h2>
+<p>Springs, actuators, prescribed motions, forces at points and buoyancy are part of the mechanism. Inputs
+of them
+are what the expressions of actuators and forces at points use by name; nobody has to set them.</p>
 """
 
 _PLATE = """

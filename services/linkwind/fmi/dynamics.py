@@ -13,7 +13,7 @@ from linkwind.fmi.structure import Dependences, Structure, is_stated
 from linkwind.fmi.units import Quantity
 from linkwind.fmi.variables import Dependence, Variability, Variable
 from linkwind.mechanism import Mechanism
-from linkwind.native.multibody import Integrator, Multibody
+from linkwind.native.multibody import OCCASIONS, Integrator, Multibody
 from linkwind.scenario import Scenario
 from linkwind.spatial import Array
 
@@ -35,6 +35,8 @@ def variables(scenario: Scenario, mechanism: Mechanism) -> list[Variable]:
     return [
         TIME,
         *_inputs(mechanism),
+        *_element_inputs(mechanism, structure.elements),
+        *_commands(mechanism),
         *(variable for piece in every for variable in _states(piece, state, len(mechanism.q0))),
         *_motion(mechanism, structure),
         *_reactions(mechanism, structure),
@@ -107,6 +109,27 @@ def _inputs(mechanism: Mechanism) -> Iterator[Variable]:
             "wrench -A a; kg, kg.m, kg.m2",
             (0.0,) * 36, elements=ADDED_INERTIA_ELEMENTS,
         )  # fmt: skip
+
+
+def _element_inputs(mechanism: Mechanism, elements: Elements) -> Iterator[Variable]:
+    tables = mechanism.tables
+    starts = tables.force_constants[tables.force_input].tolist()
+    for at, ((i, name), start) in enumerate(zip(elements.inputs, starts, strict=True)):
+        yield Variable(
+            name, "FORCE_INPUT", at, (), "input", "continuous", "", units.INPUT,
+            f"Input of {elements.names[i]}", (start,),
+        )  # fmt: skip
+
+
+def _commands(mechanism: Mechanism) -> Iterator[Variable]:
+    for i, (name, occasion) in enumerate(
+        zip(mechanism.events, mechanism.tables.event_occasion.tolist(), strict=True)
+    ):
+        if occasion == OCCASIONS["command"]:
+            yield Variable(
+                f"{name}.command", "EVENT_COMMAND", i, (), "input", "discrete", "", units.SWITCH,
+                f"Lets {name} happen when it becomes true", (0.0,), boolean=True,
+            )  # fmt: skip
 
 
 def _states(piece: Piece, state: Array, nq: int) -> Iterator[Variable]:

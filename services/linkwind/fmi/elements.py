@@ -32,6 +32,7 @@ class Elements:
         types: of them.
         bodies: of them, one for each; two with springs tell which bodies belong together.
         moved: bodies whose joint a motion prescribes.
+        inputs: element and name of each input, in the order of the tables.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -42,6 +43,7 @@ class Elements:
         rows = list(zip(self.types, tables.force_body.tolist(), strict=True))
         self.bodies = [max(pair) if kind == "spring" else pair[0] for kind, pair in rows]
         self.pairs = [pair for kind, pair in rows if kind == "spring" and min(pair) >= 0]
+        self.inputs = [(i, f"{self.names[i]}.{name}") for i, name in mechanism.inputs]
         self.moved = {pair[0] for kind, pair in rows if kind == "motion"}
         self._coordinates = [pair[1] for _, pair in rows]
 
@@ -57,6 +59,10 @@ class Elements:
             for what, _, _ in self.parameters(i)
             if self.bodies[i] in bodies and (not stored or what in _STORED)
         ]
+
+    def input_names(self, bodies: list[int]) -> list[str]:
+        """Return the inputs of all elements on some bodies."""
+        return [name for i, name in self.inputs if self.bodies[i] in bodies]
 
     def in_time(self, bodies: list[int]) -> bool:
         """Return whether an element on some bodies has an expression, which may be one of time."""

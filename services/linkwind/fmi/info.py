@@ -123,12 +123,18 @@ def _capabilities(interfaces: dict[str, dict[str, str | bool]]) -> Table:
 
 
 def _variables(variables: list[dict[str, Any]]) -> Table:
-    table = Table("name", "size", "causality", "variability", "unit", "start", "description")
+    table = Table("name", "type", "size", "causality", "variability", "unit", "start", "description")
     for each in variables:
         size = " × ".join(map(str, each["shape"]))
         plain = (each[key] for key in ("causality", "variability"))
         table.add_row(
-            each["name"], size, *plain, each["unit"] or "", _short(each["start"] or ""), each["description"]
+            each["name"],
+            each["type"],
+            size,
+            *plain,
+            each["unit"] or "",
+            _short(each["start"] or ""),
+            each["description"],
         )
     return table
 

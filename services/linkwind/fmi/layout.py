@@ -5,7 +5,9 @@ from __future__ import annotations
 from itertools import accumulate
 
 
-def dynamics_sections(n: int, nq: int, nv: int, closures: int, forces: int, events: int) -> dict[str, int]:
+def dynamics_sections(
+    n: int, nq: int, nv: int, closures: int, forces: int, inputs: int, events: int
+) -> dict[str, int]:
     """Return the size of each section, in order.
 
     Args:
@@ -14,13 +16,15 @@ def dynamics_sections(n: int, nq: int, nv: int, closures: int, forces: int, even
         nv: number of degrees of freedom of the tree.
         closures: number of joints that close loops.
         forces: number of force elements.
+        inputs: number of their inputs.
         events: number of things that may happen to joints.
     """
     known = {
         "MASS": n, "INERTIA": 6 * n, "PARENT_POINT": 3 * n, "CHILD_POINT": 3 * n, "GRAVITY": 3,
         "STIFFNESS": nv, "DAMPING": nv, "REST": nq,
         "FORCE_NUMBER": 3 * forces, "RTOL": 1, "ATOL": 1,
-        "FORCE": 3 * n, "TORQUE": 3 * n, "ADDED_INERTIA": 36 * n, "Q": nq, "V": nv,
+        "FORCE": 3 * n, "TORQUE": 3 * n, "FORCE_INPUT": inputs, "ADDED_INERTIA": 36 * n,
+        "EVENT_COMMAND": events, "Q": nq, "V": nv,
     }  # fmt: skip
     calculated = {
         "DER_Q": nq, "DER_V": nv, "POSITION": 3 * n, "ORIENTATION": 4 * n, "LINEAR": 3 * n, "ANGULAR": 3 * n,

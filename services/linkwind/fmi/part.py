@@ -119,7 +119,8 @@ def dynamics_part(scenario: Scenario, *, native_arrays: bool) -> Part:
         "dynamics", scenario, mechanism, None,
         variables if native_arrays else scalars(variables),
         dynamics_sections(
-            n, nq, nv, len(mechanism.closures), len(mechanism.forces), len(mechanism.events)
+            n, nq, nv, len(mechanism.closures), len(mechanism.forces), len(mechanism.inputs),
+            len(mechanism.events),
         ),
         (integers[0], integers[1]),
         {
@@ -134,6 +135,7 @@ def dynamics_part(scenario: Scenario, *, native_arrays: bool) -> Part:
             "force_point": tables.force_point, "instructions": len(tables.force_code),
             "constants": len(tables.force_constants), "force_start": tables.force_start,
             "force_code": tables.force_code, "force_constants": tables.force_constants,
+            "inputs": len(mechanism.inputs), "force_input": tables.force_input,
             "events": len(mechanism.events),
             "event_joint": tables.event_joint, "event_action": tables.event_action,
             "event_occasion": tables.event_occasion, "event_side": tables.event_side,

@@ -17,13 +17,14 @@ from linkwind.errors import SimulationError
 from linkwind.fmi.description import to_bytes
 from linkwind.fmi.part import Part
 from linkwind.fmi.variables import Variable
-from linkwind.native.multibody import Integrator, Multibody
+from linkwind.native.multibody import OCCASIONS, ORDERED, Integrator, Multibody
 from linkwind.spatial import Array, Motion, Wrench
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
 STEPS = 100
 EVERY = 10  # steps from result to result
+COMMANDED = 40  # step at which the first event on command happens
 EXPERIMENTS_TYPE = "application/x-ma-hs-experiments"
 
 Rows = list[dict[str, Array]]  # for each row the sections of values, flat
@@ -61,7 +62,7 @@ def _is_result(part: Part, variable: Variable) -> bool:
 
 
 def _dynamics(part: Part) -> tuple[Rows, Rows]:
-    """Push and turn every body, by some m/s² and rad/s²."""
+    """Push and turn every body, by some m/s² and rad/s²; vary inputs, command events one after the other."""
     settings, mechanism = part.scenario.dynamics, part.mechanism
     tables = mechanism.tables
     size = np.column_stack([np.tile(tables.mass[:, None], 3), np.tile(tables.inertia[:, 2:3], 3)])
@@ -69,15 +70,22 @@ def _dynamics(part: Part) -> tuple[Rows, Rows]:
     state = multibody.initial_state(mechanism.q0, mechanism.v0)
     motion, node = Motion.at_rest(multibody.n), np.zeros(1)
     integrator = Integrator[settings.integrator.upper()]
+    at_start: Array = tables.force_constants[tables.force_input]
+    on_command = tables.event_occasion == OCCASIONS["command"]
+    ordered_at = np.where(on_command, COMMANDED + 7 * np.arange(multibody.events), STEPS)
     inputs: Rows = []
     results: Rows = []
     for k in range(STEPS):
         wrench = size * _waves(k, (multibody.n, 6))
-        inputs.append(_flat({"FORCE": wrench[:, :3], "TORQUE": wrench[:, 3:]}))
+        given = at_start + 0.02 * np.maximum(1.0, np.abs(at_start)) * _waves(k, at_start.shape)
+        commands = (k >= ordered_at).astype(float)
+        known = {"FORCE_INPUT": given, "EVENT_COMMAND": commands}
+        inputs.append(_flat({"FORCE": wrench[:, :3], "TORQUE": wrench[:, 3:]} | known))
+        state[len(state) - multibody.events :][k == ordered_at] = ORDERED
         state, _ = multibody.advance(
             state, part.step, node, wrench[None].copy(), None, integrator=integrator,
             time=k * part.scenario.coupling.step_ns / 1e9, substeps=settings.substeps,
-            rtol=settings.rtol, atol=settings.atol,
+            rtol=settings.rtol, atol=settings.atol, inputs=given[None].copy(),
         )  # fmt: skip
         if (k + 1) % EVERY == 0:
             multibody.motion(state, motion)
@@ -122,7 +130,7 @@ def _move(motion: Motion, start: Motion, k: int, *, planar: bool) -> None:
         motion.orientation[i] = (w * a - z * d, w * b - z * c, w * c + z * b, w * d + z * a)
 
 
-def _waves(k: int, shape: tuple[int, int]) -> Array:
+def _waves(k: int, shape: tuple[int, ...]) -> Array:
     """Return numbers of the order of 5 that change from step to step, of few digits."""
     phase = np.arange(math.prod(shape)).reshape(shape)
     waves: Array = np.round(5.0 * np.sin(0.11 * k * (1.0 + 0.2 * phase) + phase), 2)
@@ -146,10 +154,13 @@ def _csv(variables: list[Variable], times: Iterable[float], rows: Rows) -> bytes
     """Return a table: a cell holds the elements of an array, with spaces between them."""
     lines = [",".join(f'"{name}"' for name in ("time", *(variable.name for variable in variables)))]
     for time, row in zip(times, rows, strict=True):
-        values = [row[v.section][v.offset : v.offset + v.size].tolist() for v in variables]
-        cells = [" ".join(map(repr, numbers)) for numbers in values]
+        cells = [_cell(v, row[v.section][v.offset : v.offset + v.size]) for v in variables]
         lines.append(",".join((repr(time), *cells)))
     return ("\n".join(lines) + "\n").encode()
+
+
+def _cell(variable: Variable, values: Array) -> str:
+    return " ".join(map(repr, values.astype(int).tolist() if variable.boolean else values.tolist()))
 
 
 def _manifest(names: Mapping[str, str]) -> bytes:

@@ -35,7 +35,8 @@ def read_description(file: Path) -> Any:
 class Slave:
     """An instance for Co-Simulation of FMI 2 or 3; to be used in a ``with`` statement.
 
-    Values are arrays of float64 by name of the variable, flat; all are Float64 (Real).
+    Values are arrays of float64 by name of the variable, flat; all are Float64 (Real), but for Booleans that
+    are set, 0 or 1.
     """
 
     def __init__(self, file: Path, start: float = 0.0) -> None:
@@ -94,12 +95,22 @@ class Slave:
 
     def set(self, values: Mapping[str, Array]) -> None:
         """Set variables."""
+        booleans = {name: value for name, value in values.items() if self._is_boolean(name)}
+        if booleans:
+            switches = [bool(np.all(value)) for value in booleans.values()]
+            self._fmu.setBoolean([self._variables[name].valueReference for name in booleans], switches)
+        values = {name: value for name, value in values.items() if name not in booleans}
         references = [self._variables[name].valueReference for name in values]
+        if not references:
+            return
         numbers = np.concatenate([np.ravel(value) for value in values.values()]).tolist()
         if self._version == "2":
             self._fmu.setReal(references, numbers)
         else:
             self._fmu.setFloat64(references, numbers)
+
+    def _is_boolean(self, name: str) -> bool:
+        return bool(self._variables[name].type == "Boolean")
 
     def get(self, names: Sequence[str]) -> dict[str, Array]:
         """Return variables."""

@@ -65,6 +65,7 @@ class Structure:
         for k in tree:
             knowns += [piece.called(what) for piece in self._pieces[k] for what in ("q", "v")]
             knowns += [f"{self._bodies[k]}.{what}" for what in ("F", "T", "A")]
+        knowns += self.elements.input_names(tree)
         if self.elements.in_time(tree):
             knowns.append("time")
         return tuple(map(Dependence, knowns))

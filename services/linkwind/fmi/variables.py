@@ -40,8 +40,10 @@ Planar and free joints have coordinates of two kinds: ``q_translation`` and ``q_
 A joint that closes a loop has ``.F`` and ``.T`` alone. One that may be released has room for the coordinates
 of a free joint, ``q`` of 7 and ``v`` of 6 elements: its own come first until it is released, then position
 and unit quaternion. An event ``separation`` has ``separation.time``, when it happened [s] or -1, and in Model
-Exchange the event indicator ``separation.indicator``; the stops of a joint are ``hinge.low`` and
-``hinge.high``.
+Exchange the event indicator ``separation.indicator``; one on command has the Boolean input
+``separation.command``, which lets it happen when it becomes true. The stops of a joint are ``hinge.low`` and
+``hinge.high``. A force element ``motor`` has ``motor.effort``, ``motor.power``, its parameters, and its
+inputs by the names that the scenario gives them: ``motor.u``.
 
 Further names: ``time``, ``gravity``, ``kinetic_energy``, ``potential_energy``, ``solver.integrator``,
 ``solver.substeps``, ``solver.rtol``, ``solver.atol``; in the force FMU ``density`` and ``wind``.
@@ -98,6 +100,7 @@ class Variable:
         initially: knowns that it depends on at initialisation besides those.
         elements: quantity of each element, where they differ.
         limits: least and largest value allowed; of integers, which only have this.
+        boolean: whether it is true or false; its start is then 1 or 0.
     """
 
     name: str
@@ -115,6 +118,7 @@ class Variable:
     initially: tuple[Dependence, ...] = ()
     elements: tuple[Quantity, ...] = ()
     limits: tuple[int, int] | None = None
+    boolean: bool = False
 
     @property
     def size(self) -> int:
@@ -123,8 +127,13 @@ class Variable:
 
     @property
     def integer(self) -> bool:
-        """Whether it is an Int32; else it is a Float64."""
+        """Whether it is an Int32."""
         return self.limits is not None
+
+    @property
+    def type(self) -> Literal["Float64", "Int32", "Boolean"]:
+        """Its type in FMI 3."""
+        return "Int32" if self.integer else "Boolean" if self.boolean else "Float64"
 
 
 def scalars(variables: list[Variable]) -> list[Variable]:

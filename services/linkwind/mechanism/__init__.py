@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from linkwind.mechanism.assembly import assemble
 from linkwind.mechanism.events import happenings
-from linkwind.mechanism.forces import prescribed, with_forces
+from linkwind.mechanism.forces import inputs, prescribed, with_forces
 from linkwind.mechanism.start import WORLD_START, JointStart, Start, start
 from linkwind.mechanism.tables import padded, room, tables
 from linkwind.mechanism.tree import WORLD, carriers, order
@@ -33,6 +33,7 @@ class Mechanism:
         closures: names of the joints that close loops.
         events: names of what may happen to joints: events, then stops.
         forces: names of the force elements.
+        inputs: element, by its number, and name of each of their inputs, in the order of the tables.
         tables: bodies, joints and gravity as flat arrays.
         q0: joint coordinates at the start [m, rad, unit quaternions], shape (nq,).
         v0: joint velocities at the start [m/s, rad/s], shape (nv,).
@@ -44,6 +45,7 @@ class Mechanism:
     closures: tuple[str, ...]
     events: tuple[str, ...]
     forces: tuple[str, ...]
+    inputs: tuple[tuple[int, str], ...]
     tables: Tables
     q0: Array
     v0: Array
@@ -88,6 +90,7 @@ def build(scenario: Scenario) -> Mechanism:
         closures=tuple(loop.joint.name for loop in loops),
         events=tuple(each.name for each in happening),
         forces=tuple(force.name for force in scenario.forces),
+        inputs=tuple((i, name) for i, force in enumerate(scenario.forces) for name in inputs(force)),
         tables=with_forces(flat, scenario, carried, q0, v0),
         q0=q0,
         v0=v0,

@@ -30,6 +30,7 @@ VARIABLES = {
 }
 COMPONENTS = ("fx", "fy", "fz", "tx", "ty", "tz")
 NOTHING = Program((), ())
+TOLD = ("effort", "power")  # what an FMU tells of an element by name
 
 Vector3 = tuple[float, float, float]
 
@@ -85,9 +86,11 @@ def with_forces(
     _check_once(elements, items)
     code: list[tuple[int, int]] = []
     constants: list[float] = []
+    inputs: list[int] = []
     starts = [0]
     for element in elements:
         code += element.program.shifted(len(constants))
+        inputs += range(len(constants), len(constants) + element.program.inputs)
         constants += element.program.constants
         starts.append(len(code))
     return replace(
@@ -99,6 +102,7 @@ def with_forces(
         force_start=np.array(starts, np.int32),
         force_code=np.array(code, np.int32).reshape(-1, 2),
         force_constants=np.array(constants, np.float64),
+        force_input=np.array(inputs, np.int32),
     )
 
 
@@ -172,14 +176,25 @@ def motion_program(motion: Prescribed, item: str) -> Program:
     return _program(motion, ("position",), item)
 
 
+def inputs(force: Force) -> dict[str, float]:
+    """Return the inputs of an element with their values at the start, in the order of the tables."""
+    return dict(sorted(getattr(force, "inputs", {}).items()))
+
+
 def _program(force: Force, keys: tuple[str, ...], item: str) -> Program:
     functions = {key: getattr(force, key) for key in keys}
+    for name in set(TOLD) & inputs(force).keys():
+        raise MechanismError(
+            f'{item}.inputs: expected names but {" and ".join(TOLD)}; got "{name}", which the FMU tells of '
+            f"{force.name}. Rename it."
+        )
     return compile_program(
         getattr(force, "let", None),
         {key: _law(function) for key, function in functions.items() if function is not None},
         item,
         variables=VARIABLES[force.type],
         components=keys,
+        inputs=inputs(force),
     )
 
 

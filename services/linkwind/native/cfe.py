@@ -152,4 +152,5 @@ def _free(tables: Tables) -> Tables:
         force_start=tables.force_start,
         force_code=tables.force_code,
         force_constants=tables.force_constants,
+        force_input=tables.force_input,
     )

@@ -60,6 +60,7 @@ _size = declare("lw_multibody_size", [_pointer], ctypes.c_size_t)
 _init = declare("lw_multibody_init", [_pointer] * 3)
 _advance = declare("lw_multibody_advance", [_pointer] * 2)
 _radau5_size = declare("lw_radau5_size", [_int] * 2, ctypes.c_size_t)
+_set_inputs = declare("lw_multibody_set_inputs", [_pointer] * 2, None)
 _affine_size = declare("lw_affine_size", [_int], ctypes.c_size_t)
 _affine_inertia = declare("lw_affine_inertia", [_pointer] * 4 + [_double, _pointer], None)
 _advance_affine = declare("lw_multibody_advance_affine", [_pointer] * 3)
@@ -75,7 +76,7 @@ _repeat = declare("lw_multibody_repeat", [_pointer, _pointer, _int])
 # lw_macro_step: packing all of it at once is several times faster than converting fifteen arguments.
 NOT_YET, ORDERED = -1.0, -2.0  # in a state: an event that has not happened; one that shall, on command
 KNOWN_ARRAYS = 32  # whose addresses are remembered
-_macro_step = struct.Struct("@PddPPPddiiiPPPP")
+_macro_step = struct.Struct("@PddPPPddiiiPPPPP")
 _affine = struct.Struct("@PPPPPP")
 _evaluation = struct.Struct("@7P")
 
@@ -94,6 +95,7 @@ class Multibody:
         rows: number of equations that they are.
         events: number of things that may happen to joints.
         forces: number of force elements.
+        inputs: number of their inputs.
         state_size: length of a state: q, v, the substep [s] that dopri5 would take next (0 = unknown), and
             for each event the time at which it happened [s], or ``NOT_YET``; a stop has since when its joint
             rests on it.
@@ -126,6 +128,7 @@ class Multibody:
         self.n, self.nq, self.nv, self.closures, self.events, self.forces = list(many.values())[:6]
         named = (bodies, self.n), (closures, self.closures), (events, self.events), (forces, self.forces)
         self._names = Names(*(_quoted(names, count) for names, count in named))
+        self.inputs = many["inputs"]
         self.state_size = self.nq + self.nv + 1 + self.events
         pointers = {name: array.ctypes.data for name, array in arrays.items()}
         native = CTables(**many, **pointers)
@@ -146,6 +149,7 @@ class Multibody:
         self._known: dict[int, tuple[Array, int]] = {}
         if status := _init(self._model, ctypes.addressof(native), self._fault_at):
             refuse(tables, status, self._fault.item)
+        self._at_start = arrays["force_constants"][arrays["force_input"]]
 
     def _make_room(self) -> None:
         """Make room for what ``Evaluation`` has, in its order, which is that of the struct."""
@@ -194,6 +198,7 @@ class Multibody:
         substeps: int = 1,
         rtol: float = 1e-6,
         atol: float = 1e-9,
+        inputs: Array | None = None,
     ) -> tuple[Array, Array]:
         """Take one macro step.
 
@@ -211,6 +216,8 @@ class Multibody:
             substeps: number of equal substeps; of dopri5, h/substeps bounds the first substep.
             rtol: tolerance of dopri5, relative to each coordinate and velocity, per substep.
             atol: its absolute part, in the unit of the coordinate.
+            inputs: of force elements, shape (m, inputs), C-contiguous, the same polynomial in time; None: as
+                at the start.
 
         Returns:
             The new state, and the work [J], shape (2,): done over the step by the whole wrench, and taken
@@ -221,8 +228,13 @@ class Multibody:
                 method of radau5 does not converge.
             ValueError: an argument that makes no sense, or of a wrong shape.
         """
-        self._prepare(state, h, nodes, wrenches, added_inertia, integrator, time, substeps, rtol, atol)
+        if inputs is not None and inputs.shape != (len(nodes), self.inputs):
+            self._refuse("inputs", (len(nodes), self.inputs), inputs)
+        how = integrator, time, substeps, rtol, atol
+        self._prepare(state, h, nodes, wrenches, added_inertia, *how, inputs)
         status = _advance(self._model, self._step_at)
+        if inputs is not None:
+            _set_inputs(self._model, address(self._at_start))
         if status:
             arguments = {"h": h, "nodes": nodes, "integrator": integrator, "substeps": substeps}
             fail(status, self._fault, self._names, arguments | {"rtol, atol": (rtol, atol)})
@@ -231,6 +243,7 @@ class Multibody:
     def _prepare(
         self, state: Array, h: float, nodes: Array, wrenches: Array, added_inertia: Array | None,
         integrator: Integrator | int, time: float, substeps: int, rtol: float, atol: float,
+        inputs: Array | None = None,
     ) -> None:  # fmt: skip
         """Fill the ``lw_macro_step``."""
         count = len(nodes)
@@ -241,6 +254,7 @@ class Multibody:
             self._step, 0, self._state_at, h, time, self._locate(nodes), self._locate(wrenches),
             self._locate_added(added_inertia), rtol, atol, count, integrator, substeps,
             self._next_at, self._work_at, self._fault_at, self._locate_stages(integrator),
+            0 if inputs is None else address(inputs),
         )  # fmt: skip
 
     def advance_affine(

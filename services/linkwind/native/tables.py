@@ -80,6 +80,7 @@ class Tables:
             point force is in the body frame; volume [m³], density [kg/m³], shape (f, 3).
         force_start, force_code, force_constants: programs as in ``FieldTable``, maybe empty, shapes (f + 1,),
             (instructions, 2), (any,); their variables and results are those of ``lw_force_type``.
+        force_input: which of the constants are inputs, with the value at the start, int32, shape (inputs,).
     """
 
     parent: Index
@@ -115,9 +116,10 @@ class Tables:
     force_start: Index = field(default_factory=lambda: np.zeros(1, np.int32))
     force_code: Index = field(default_factory=lambda: np.zeros((0, 2), np.int32))
     force_constants: Array = field(default_factory=lambda: np.zeros(0))
+    force_input: Index = field(default_factory=lambda: np.zeros(0, np.int32))
 
 
-COUNTS = ("n", "nq", "nv", "closures", "events", "forces", "instructions", "constants")
+COUNTS = ("n", "nq", "nv", "closures", "events", "forces", "instructions", "constants", "inputs")
 
 
 class CTables(ctypes.Structure):
@@ -161,13 +163,14 @@ _CHECKS = {
     72: ("force_point", "finite numbers"),
     73: ("force_number", "finite numbers"),
     74: ("force_start", "an instruction, not before the one before it"),
+    75: ("force_input", "one of the constants"),
 }
 
 
 _INTEGERS = (
     "parent", "order", "joint_type", "q_index", "v_index", "closure_body", "closure_rows", "event_joint",
     "event_action", "event_occasion", "event_side", "force_type", "force_body",
-    "force_start", "force_code",
+    "force_start", "force_code", "force_input",
 )  # fmt: skip
 
 
@@ -176,13 +179,15 @@ def counts(tables: Tables) -> dict[str, int]:
     sized: tuple[Array | Index, ...] = (
         tables.parent, tables.rest, tables.stiffness, tables.closure_rows, tables.event_joint,
         tables.force_type, np.atleast_2d(tables.force_code)[:, 0], tables.force_constants,
+        tables.force_input,
     )  # fmt: skip
     return {name: int(np.size(table)) for name, table in zip(COUNTS, sized, strict=True)}
 
 
 def _shapes(
-    n: int, nq: int, nv: int, closures: int, events: int, forces: int, instructions: int, constants: int
-) -> dict[str, tuple[int, ...]]:
+    n: int, nq: int, nv: int, closures: int, events: int, forces: int, instructions: int, constants: int,
+    inputs: int,
+) -> dict[str, tuple[int, ...]]:  # fmt: skip
     integers = dict.fromkeys(("parent", "order", "joint_type", "q_index", "v_index"), (n,))
     points = dict.fromkeys(("parent_point", "child_point"), (n, 3))
     rotations = dict.fromkeys(("parent_rotation", "child_rotation"), (n, 3, 3))
@@ -191,6 +196,7 @@ def _shapes(
     closed = {"body": (2,), "rows": (), "point": (2, 3), "rotation": (2, 3, 3), "length": ()}
     pushing = {"type": (), "body": (2,), "point": (2, 3), "number": (3,)}
     programs = {"start": (forces + 1,), "code": (instructions, 2), "constants": (constants,)}
+    programs["input"] = (inputs,)
     return (
         {"mass": (n,), "inertia": (n, 6), "gravity": (3,), "rest": (nq,)}
         | integers | points | rotations | degrees

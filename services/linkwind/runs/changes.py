@@ -15,12 +15,12 @@ HOW = r"bus\..*|log\..*|coupling\.timeout|description|providers\.\d+\.flow\.thre
 # Settings that may change from a communication point on; what bodies and providers remember stays right.
 PHYSICS = (
     r"time\.end|environment\..*|joints\.\d+\.(stiffness|damping|rest).*|dynamics\.(integrator|substeps|rtol|atol)"
-    r"|providers\.\d+\.(plate|field)\..*|providers\.\d+\.flow\.frames"
+    r"|forces\.\d+\.inputs\..*|providers\.\d+\.(plate|field)\..*|providers\.\d+\.flow\.frames"
 )
 REMEMBERED = r"environment\.(wind|density|viscosity|gusts).*"  # by a flow: its lattice has them in its state
 MAY_CHANGE = (
     "time.end, environment.*, joints.*.stiffness, .damping and .rest, dynamics.integrator, .substeps, .rtol "
-    "and .atol, the settings of the models plate and field, coupling.timeout, bus.*, log.*"
+    "and .atol, forces.*.inputs, the settings of the models plate and field, coupling.timeout, bus.*, log.*"
 )
 
 

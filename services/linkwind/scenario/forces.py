@@ -4,14 +4,20 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, WithJsonSchema
 
 from linkwind.scenario.functions import AnyFunction
 from linkwind.scenario.providers import Definitions
 from linkwind.scenario.quantities import Name, Section, Vector, quantity
 
 _NAME = "Name, a letter followed by letters, digits and _"
+_INPUTS = "Names that the expressions may use, and their values, which the FMU takes as inputs"
 _COORDINATE = "Number of the joint's coordinate; of a planar joint 0 is x, 1 y, 2 the angle"
+
+Inputs = Annotated[
+    dict[Name, float],
+    WithJsonSchema({"type": "object", "additionalProperties": {"type": "number"}}),
+]
 
 
 class Spring(Section):
@@ -44,7 +50,10 @@ class Actuator(Section):
     name: Name = Field(description=_NAME)
     joint: str = Field(description="Name of a revolute, prismatic or planar joint that carries a body")
     coordinate: int = Field(default=0, ge=0, le=2, description=_COORDINATE)
-    force: AnyFunction = Field(description="Force or torque, N or N·m, of t, q, v; a table: of t")
+    inputs: Inputs = quantity(_INPUTS, "any unit", {})
+    force: AnyFunction = Field(
+        description="Force or torque, N or N·m, of t, q, v and the inputs; a table: of t"
+    )
 
 
 class Motion(Section):
@@ -67,6 +76,7 @@ class PointForce(Section):
         "Where the force acts, in the body frame from the centre of mass", "m", (0.0, 0.0, 0.0)
     )
     frame: Literal["world", "body"] = Field(default="world", description="Frame of force and torque")
+    inputs: Inputs = quantity(_INPUTS, "any unit", {})
     let: Definitions = Field(
         default_factory=dict,
         description="Named sub-expressions, evaluated in this order; each may use those before it",
