@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import csv
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -37,6 +39,15 @@ def test_names_are_those_that_are_said() -> None:
         _ = linkwind.fly
     with pytest.raises(linkwind.LinkwindError, match="two_lnk"):
         linkwind.load("two_lnk")
+
+
+def test_editors_and_checkers_know_the_same_names() -> None:
+    stub = ast.parse(Path(linkwind.__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
+    imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
+    places = {name.asname or name.name: (node.module, name.name) for node in imports for name in node.names}
+    assert sorted(places) == linkwind.__all__
+    for name, (module, attribute) in places.items():
+        assert getattr(linkwind, name) is getattr(import_module(str(module)), attribute)
 
 
 def test_a_run_and_what_programs_do_with_its_log(tmp_path: Path) -> None:

@@ -25,12 +25,12 @@ from numpy.typing import NDArray
 
 from linkwind import aero
 from linkwind.aero import Own, PythonSource
+from linkwind.aero.source import refuse_while_loading
 from linkwind.log import export
 from linkwind.log.reader import Log, open_log
 from linkwind.runs import resume as resuming
 from linkwind.runs import run as running
 from linkwind.runs import verify as verifying
-from linkwind.runs.keeping import LOG
 from linkwind.runs.labels import labels_of
 from linkwind.runs.own import settled
 from linkwind.scenario import Scenario
@@ -63,6 +63,7 @@ def run(
     Raises:
         LinkwindError: the run ended early; its log and report tell as well.
     """
+    refuse_while_loading()
     own = _own(models)
     scenario, _ = settled(_together(scenario, own), own)
     return running.run(scenario, _path(out), progress, own, _path(tls), report=report)
@@ -97,6 +98,7 @@ def serve(
     from linkwind.bus.zenoh import ZenohProviderLink
     from linkwind.credentials import identity_in
 
+    refuse_while_loading()
     provider = session(name, None if model is None else aero.own(model))
     identity = identity_in(_path(tls), name)
     ends = (_several(connect), _several(listen))
@@ -125,6 +127,7 @@ def verify(
     Raises:
         InputError: the log cannot be run again here, or a model is missing or another one.
     """
+    refuse_while_loading()
     opened, scenario = verifying.scenario_of(_opened(log).path)
     recorded = from_recorded_wrenches
     return verifying.verify(opened, scenario, progress, _own(models), from_recorded_wrenches=recorded)
@@ -157,6 +160,7 @@ def resume(
         MismatchError: what was recorded does not come out again here.
         LinkwindError: there is nothing to go on with, or the run ended early.
     """
+    refuse_while_loading()
     own = _own(models)
     found = resuming.plan(_opened(log), from_step, overrides)
     found = dataclasses.replace(found, scenario=_together(found.scenario, own))
@@ -193,10 +197,7 @@ def _together(scenario: Scenario, own: Mapping[str, Own]) -> Scenario:
 
 
 def _opened(log: Log | str | Path) -> Log:
-    if isinstance(log, Log):
-        return log
-    path = Path(log)
-    return open_log(path / LOG if path.is_dir() else path)
+    return log if isinstance(log, Log) else open_log(log)
 
 
 def _path(path: str | Path | None) -> Path | None:

@@ -7,6 +7,7 @@ import hashlib
 import pytest
 from typer.testing import CliRunner
 
+import linkwind
 from linkwind import aero
 from linkwind.cli import app
 from linkwind.cli.own import load_with
@@ -53,6 +54,14 @@ def test_the_plate_as_fmu_gives_the_native_trajectory(tmp_path, native, fmi, int
     assert logged.sha256 == hashlib.sha256(files[fmi].read_bytes()).hexdigest()
     assert logged.variables["link2.v[1]"].quantity == "link2.velocity.x"
     assert str(files[fmi].parent) not in open_log(outcome.log).scenario_json
+
+
+def test_a_program_puts_it_in_place(tmp_path, native):
+    expected, files = native
+    scenario = load("two_link", [*SHORT, "bus.transport=inprocess"])
+    outcome = linkwind.run(scenario, tmp_path / "run", models={"aero": str(files["3"])}, report=False)
+    assert outcome.result.final_state_sha256 == expected
+    assert linkwind.verify(outcome.log, models={"aero": files["3"]}).identical
 
 
 def test_a_stiff_drag_flies_with_the_derivatives_of_the_fmu(tmp_path):

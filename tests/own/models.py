@@ -43,6 +43,26 @@ class Wake(linkwind.ForceModel):
         (self.speed,) = struct.unpack("<d", blob)
 
 
+class Everything(linkwind.ForceModel):
+    """It returns all that there is."""
+
+    capabilities = linkwind.Capabilities(added_inertia=True, response_size=72, diagnostics=("speed [m/s]",))
+
+    def evaluate(self, t, motion, wrench):
+        wrench.force[:] = -2.0 * motion.linear
+        wrench.response[:, range(3), range(3)] = 2.0
+        wrench.added_inertia[:] = 0.1 * np.eye(6)
+        wrench.diagnostics[0] = np.linalg.norm(motion.linear[0])
+
+
+def counts(t, motion, wrench):
+    COUNT.append(t)
+    wrench.force[:, 0] = len(COUNT)
+
+
+COUNT = []
+
+
 def fails_later(t, motion, wrench):
     if t > 0.0115:
-        print(1.0 / (t - t))  # line 48
+        print(1.0 / (t - t))  # line 68

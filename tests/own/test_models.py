@@ -109,7 +109,7 @@ def test_the_motion_cannot_be_written_to():
 def test_an_exception_says_file_line_step_and_time():
     model = built(f"{models.__file__}:fails_later")
     evaluated(model, t=0.011)
-    text = f"{models.__file__}:48, in fails_later: step 12 (t = 0.012 s): ZeroDivisionError: float division"
+    text = f"{models.__file__}:68, in fails_later: step 12 (t = 0.012 s): ZeroDivisionError: float division"
     with pytest.raises(SimulationError, match="^" + re.escape(text)) as error:
         evaluated(model, t=0.012)
     assert isinstance(error.value.__cause__, ZeroDivisionError)
@@ -159,6 +159,14 @@ class NoBytes(Model):
 
     def close(self):
         raise OSError("gone")
+
+
+def test_an_end_of_the_program_is_one_of_the_run():
+    def leaves(t, motion, wrench):
+        raise SystemExit(3)
+
+    with pytest.raises(SimulationError, match=r"in leaves: step 3 \(t = 0\.003 s\): SystemExit: 3"):
+        evaluated(built(leaves))
 
 
 def test_what_remembers_has_to_save():
@@ -244,6 +252,11 @@ def test_what_is_no_model_is_refused(model, error):
         ("x = 1\ndef f(:\n", "f", r"mine\.py:2: expected Python; got: invalid syntax"),
         ("import numpy\n1/0", "f", r"mine\.py:2, in <module>: ZeroDivisionError"),
         ("raise SystemExit(3)", "f", r"mine\.py:1, in <module>: SystemExit: 3"),
+        (
+            "import linkwind\ndef f(t, m, w): ...\nlinkwind.run(linkwind.load('chain'), models={'aero': f})",
+            "f",
+            r"mine\.py:3, in <module>: InputError: expected a file that only defines.* if __name__",
+        ),
         ("f = 3", "f", r"mine\.py:f: expected a function of t, motion and wrench, .*; got 3"),
     ],
 )

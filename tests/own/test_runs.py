@@ -6,9 +6,11 @@ import hashlib
 import json
 import os
 import signal
+import sys
 import threading
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -20,6 +22,7 @@ from linkwind.errors import FaultError, InputError
 from linkwind.log import contents
 from linkwind.log.origin import origin
 from linkwind.log.reader import open_log
+from linkwind.runs.conformance import conformance
 from linkwind.scenario import from_json
 from tests.faults.recovered import LONG, child_of, under_way, unharmed
 from tests.faults.test_processes import Programs
@@ -120,15 +123,55 @@ def test_a_run_goes_on_with_its_model_from_a_checkpoint(tmp_path):
 
 
 def test_a_function_that_fails_ends_the_run_with_one_error(tmp_path):
-    text = r"stopped at step 12: SimulationError: .*models\.py:48, in fails_later: step 12 \(t = 0\.012 s\)"
+    text = r"stopped at step 12: SimulationError: .*models\.py:68, in fails_later: step 12 \(t = 0\.012 s\)"
     for name, settings in (("here", HERE), ("zenoh", SHORT)):
         with pytest.raises(FaultError, match=text):
             fly(tmp_path / name, f"{FILE}:fails_later", settings)
         log = open_log(tmp_path / name / "run" / "log.mcap")
         assert log.steps == 11
-        assert "models.py:48" in log.error
+        assert "models.py:68" in log.error
         assert linkwind.verify(log, models={"aero": f"{FILE}:fails_later"}).identical
     assert "print(1.0 / (t - t))" in (tmp_path / "zenoh" / "run" / "aero.log").read_text()  # the traceback
+
+
+def test_all_that_a_model_can_return_is_used_and_logged(tmp_path):
+    log = fly(tmp_path, models.Everything).log
+    answers, path = linkwind.table(log, "wrench_aero"), linkwind.table(log)
+    assert answers["link2.added_inertia.22"][0] == 0.1
+    assert answers["response.0"][0] == 2.0
+    assert (
+        answers["speed [m/s]"][0] == np.hypot(path["link1.linear.x [m/s]"], path["link1.linear.y [m/s]"])[0]
+    )
+    assert linkwind.verify(log, models={"aero": models.Everything}).identical
+
+
+def test_a_branch_keeps_the_memory(tmp_path):
+    whole = fly(tmp_path, f"{FILE}:Wake", [*HERE, "log.checkpoint_every=30"])
+    own = {"aero": f"{FILE}:Wake"}
+    settings = ["environment.gravity=[0, 0, 0]"]
+    branch = linkwind.resume(
+        whole.log, tmp_path / "b", from_step=70, overrides=settings, models=own, report=False
+    )
+    force, other = (linkwind.table(run.log, "wrench_aero")["link1.force.y [N]"] for run in (whole, branch))
+    assert force[:71].tolist() == other[:71].tolist()
+    assert 0.0 < abs(other[72] - force[72]) < 0.1 * abs(force[72])  # without memory it would be a fifth
+    assert linkwind.verify(branch.log, models=own).identical
+
+
+def test_a_hidden_memory_is_found(tmp_path):
+    scenario = linkwind.load("two_link", ["aero.model=python"])
+    command = [
+        sys.executable,
+        "-m",
+        "linkwind",
+        "aero",
+        "--connect",
+        "{endpoint}",
+        "--model",
+        f"{FILE}:counts",
+    ]
+    found = {result.check: result.ok for result in conformance(scenario, "aero", command, tmp_path / "out")}
+    assert {check for check, ok in found.items() if ok is False} == {"iterations", "goes on", "comes back"}
 
 
 def test_numbers_that_are_none_are_refused(tmp_path):

@@ -49,8 +49,8 @@ def own(model: object) -> Own:
     Raises:
         InputError: it is none.
     """
-    if isinstance(model, Path) or (isinstance(model, str) and model.endswith(".fmu")):
-        return Path(model)
+    if isinstance(model, str | Path):
+        return Path(model) if str(model).endswith(".fmu") else python_source(str(model))
     return python_source(model)
 
 

@@ -50,7 +50,7 @@ class PythonForces:
             self.capabilities = _capabilities(source, self._model)
         except LinkwindError:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise InputError(f"{place(error)}: {type(error).__name__}: {error}. Correct it.") from error
         self._accepted, self._trial = _ReadOnly(), _ReadOnly()
         if hasattr(self._model, "frame"):
@@ -64,7 +64,7 @@ class PythonForces:
         """
         try:
             self._model.commit(t, self._accepted.of(motion))
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise self._failed(error, t) from error
 
     def evaluate(self, t: float, motion: Motion, wrench: Wrench) -> None:
@@ -79,7 +79,7 @@ class PythonForces:
                 array.fill(0.0)
         try:
             self._model.evaluate(t, self._trial.of(motion), wrench)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise self._failed(error, t) from error
         for name, array in zip(_ARRAYS, arrays, strict=True):
             if getattr(wrench, name) is not array:
@@ -138,7 +138,7 @@ class PythonForces:
     def _when(self, t: float) -> str:
         return f"step {t * 1e9 / self._step_ns:g} (t = {t:g} s)"
 
-    def _failed(self, error: Exception, t: float) -> LinkwindError:
+    def _failed(self, error: BaseException, t: float) -> LinkwindError:
         if isinstance(error, LinkwindError):
             return error
         _log.info("%s", "".join(traceback.format_exception(error)).rstrip())

@@ -8,6 +8,7 @@ import hashlib
 import inspect
 import sys
 import traceback
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -17,6 +18,8 @@ from linkwind.aero.base import item
 from linkwind.errors import InputError
 from linkwind.scenario import Provider, Scenario
 from linkwind.scenario.providers import PythonModel
+
+_loading: ContextVar[bool] = ContextVar("loading", default=False)
 
 
 @dataclass(frozen=True)
@@ -157,11 +160,23 @@ def _executed(file: Path, code: bytes) -> ModuleType:
     folder = str(file.resolve().parent)
     if folder not in sys.path:
         sys.path.append(folder)  # last, so that it hides nothing
+    before = _loading.set(True)
     try:
         exec(compile(code, str(file), "exec"), module.__dict__)
     except (Exception, SystemExit) as error:
         raise InputError(f"{place(error)}: {type(error).__name__}: {error}. Correct it.") from error
+    finally:
+        _loading.reset(before)
     return module
+
+
+def refuse_while_loading() -> None:
+    """Raise InputError while the file of a force model is executed: a run in it would load it once more."""
+    if _loading.get():
+        raise InputError(
+            "expected a file that only defines, when it is loaded for its force model; got a run in it. Put "
+            'that under if __name__ == "__main__":'
+        )
 
 
 def _told(name: str, sha256: str | None) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import zlib
 
+LOG = "log.mcap"  # in the folder of a run
 PROFILE = "linkwind"  # of the MCAP header
 PACKAGE = "linkwind.v1."
 

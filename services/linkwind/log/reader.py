@@ -210,12 +210,13 @@ def open_log(path: str | Path) -> Log:
     """Open a log for reading, whole, cut or damaged.
 
     Args:
-        path: the MCAP file.
+        path: the MCAP file, or the folder of a run with its ``log.mcap``.
 
     Raises:
         LogError: the file is missing, empty, not MCAP, or not a log of linkwind.
     """
     path = Path(path)
+    path = path / contents.LOG if path.is_dir() else path
     check_magic(path)
     with path.open("rb") as file:
         return Log(path, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))

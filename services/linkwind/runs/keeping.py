@@ -11,11 +11,12 @@ from typing import Generic, TypeVar
 from linkwind.bus.base import DynamicsLink
 from linkwind.errors import LinkwindError, StoppedError
 from linkwind.interrupt import TooLateError, at_most, stops_as_interrupt
+from linkwind.log.contents import LOG
 from linkwind.log.writer import LogWriter
 
 T = TypeVar("T")
 
-LOG, REPORT = "log.mcap", "report.html"
+REPORT = "report.html"  # beside the log
 REPORT_TIME = 1.0  # s for the report of a run that was told to stop
 
 

@@ -18,7 +18,7 @@ from typing import Any
 from linkwind import schema
 from linkwind.dynamics.service import DynamicsService
 from linkwind.errors import LinkwindError, LogError, ScenarioError
-from linkwind.log.contents import MOTION
+from linkwind.log.contents import LOG, MOTION
 from linkwind.log.head import is_blank
 from linkwind.log.reader import Log, open_log
 from linkwind.log.sink import alone
@@ -26,7 +26,7 @@ from linkwind.native.library import library_sha256
 from linkwind.report import write_report
 from linkwind.runs import folder as folders
 from linkwind.runs.changes import HOW, differences
-from linkwind.runs.keeping import LOG, REPORT
+from linkwind.runs.keeping import REPORT
 from linkwind.runs.record import exchanges
 from linkwind.runs.resume import Plan, Resumed, plan, resume_here
 from linkwind.runs.run import Ends, Outcome, Progress, checked, dynamics, with_elsewhere

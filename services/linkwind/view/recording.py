@@ -14,7 +14,7 @@ import numpy as np
 
 from linkwind.errors import LogError
 from linkwind.log import tables
-from linkwind.log.contents import STATE, STEP, WRENCH
+from linkwind.log.contents import LOG, STATE, STEP, WRENCH
 from linkwind.log.seek import SeekableLog, open_seekable
 from linkwind.report.arrays import pack
 from linkwind.report.data import Diagnostics, Run, coordinates, no_trajectory
@@ -24,7 +24,6 @@ from linkwind.spatial import Array
 
 WHOLE = 20_000, 1e9  # states, and bytes of the log around them, up to which all are shown; else a sample
 SAMPLES = 1200  # states of that sample
-LOG = "log.mcap"
 TAIL = 60  # states that are told of a run between two looks at it
 
 
