@@ -162,9 +162,9 @@ def _behind_a_bar(
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from linkwind.scenario import from_json
+    from linkwind.log.scenarios import recorded
 
-    total = end if end is not None else from_json(log.scenario_json).time.end
+    total = end if end is not None else recorded(log).time.end
     shown = TextColumn("{task.completed:.2f} of {task.total:.2f} s")
     columns = (TextColumn("{task.description}"), BarColumn(), shown, TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:

@@ -188,6 +188,6 @@ def _show(kept: Any, found: Sequence[ForceDifference], same: tuple[int, int]) ->
 
 
 def _steps(log: Log) -> int:
-    from linkwind.scenario import from_json
+    from linkwind.log.scenarios import last_recorded
 
-    return [from_json(log.scenario_json), *map(from_json, log.changes.values())][-1].steps
+    return last_recorded(log).steps

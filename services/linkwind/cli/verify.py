@@ -40,11 +40,12 @@ def verify(
 
     Example: linkwind verify runs/two_link-20260101-120000/log.mcap
     """
-    from linkwind.runs.verify import changes_of, scenario_of
+    from linkwind.log.scenarios import last_recorded
+    from linkwind.runs.verify import scenario_of
     from linkwind.runs.verify import verify as verify_log
 
     opened, scenario = scenario_of(log)
-    steps = [scenario, *changes_of(opened).values()][-1].steps
+    steps = last_recorded(opened).steps
     own = by_provider(scenario, force_fmu, model)
 
     def job(progress: Callable[[int], None]) -> Verified:

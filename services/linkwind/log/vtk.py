@@ -18,7 +18,7 @@ from linkwind.errors import InputError, LogError
 from linkwind.frames import FlowFrame
 from linkwind.log import contents, tables
 from linkwind.log.reader import Log
-from linkwind.scenario import from_json
+from linkwind.log.scenarios import recorded
 from linkwind.spatial import Array
 
 STATES = 300  # of the bodies, where there are no frames
@@ -157,7 +157,7 @@ def _bodies(hl: Any, path: Path, log: Log, state: dict[str, Any]) -> str:
 def _outlines(log: Log) -> Outlines:
     """Return the outlines of a log's bodies; a body without a shape is a point."""
     points, body, types = [], [], []
-    for index, each in enumerate(from_json(log.scenario_json).bodies):
+    for index, each in enumerate(recorded(log).bodies):
         flat = np.zeros((1, 2)) if each.shape is None else each.shape.outline()
         points.append(np.hstack([flat, np.zeros((len(flat), 1))]))
         body += [index] * len(flat)

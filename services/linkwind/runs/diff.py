@@ -16,10 +16,10 @@ from linkwind.log.compare import FieldDifference, Matched, deviation, difference
 from linkwind.log.contents import MOTION, STATE, STEP, WRENCH
 from linkwind.log.difference import Difference, printable
 from linkwind.log.reader import Log, open_log
+from linkwind.log.scenarios import recorded
 from linkwind.mechanism import build
 from linkwind.runs.comparison import finder
 from linkwind.runs.framediff import frame_differences
-from linkwind.scenario import from_json
 from linkwind.spatial import Array
 
 INTERVALS = 8  # of time, into which the growth is divided
@@ -104,7 +104,7 @@ def diff(one: Path, other: Path, *, rtol: float = 0.0) -> Compared:
         LogError: a file is no log, or the two are of other bodies.
     """
     logs = open_log(one), open_log(other)
-    left, right = (from_json(log.scenario_json) for log in logs)
+    left, right = (recorded(log) for log in logs)
     _refuse_other_bodies(*logs)
     remarks = list(_remarks(*logs))
     same_step = left.coupling.step_ns == right.coupling.step_ns

@@ -12,12 +12,12 @@ from linkwind.credentials import identity_in
 from linkwind.dynamics.service import DynamicsService
 from linkwind.log.contents import DYNAMICS
 from linkwind.log.reader import Log
+from linkwind.log.scenarios import recorded
 from linkwind.mechanism import build
 from linkwind.runs import folder as folders
 from linkwind.runs.recorded_forces import check_fits, recorded_session
 from linkwind.runs.run import Beginning, Outcome, Progress, drive
 from linkwind.runs.substitution import changed, metadata
-from linkwind.scenario import from_json
 
 
 def live_dynamics(log: Log, overrides: Sequence[str], out: Path | None, progress: Progress) -> Outcome:
@@ -68,7 +68,7 @@ def answer_dynamics(
     from linkwind.aero.service import serve
     from linkwind.bus.zenoh import ZenohProviderLink
 
-    timeout = from_json(log.scenario_json).bus.start_timeout
+    timeout = recorded(log).bus.start_timeout
 
     def answer(name: str) -> int:
         provider = recorded_session(log, name)

@@ -11,6 +11,7 @@ from linkwind.aero.base import Capabilities
 from linkwind.errors import InputError, LogError, SimulationError
 from linkwind.log.contents import WRENCH
 from linkwind.log.reader import Log
+from linkwind.log.scenarios import last_recorded, recorded
 from linkwind.messages import KINDS, WrenchMessage
 from linkwind.protocol import ProviderSession
 from linkwind.scenario import Scenario, from_json
@@ -138,13 +139,12 @@ def check_fits(log: Log, scenario: Scenario) -> None:
     Raises:
         InputError: bodies, providers or step sizes differ, or the record is too short.
     """
-    recorded = from_json(log.scenario_json)
-    steps = [recorded, *map(from_json, log.changes.values())][-1].steps
+    step_ns, steps = recorded(log).coupling.step_ns, last_recorded(log).steps
     bodies = {p.name: tuple(p.bodies) for p in scenario.providers}
     for what, wanted, there in (
         ("bodies", ", ".join(body.name for body in scenario.bodies), ", ".join(log.bodies)),
         ("providers", _listed(bodies), _listed(log.provider_bodies)),
-        ("coupling.step", f"{scenario.coupling.step_ns} ns", f"{recorded.coupling.step_ns} ns"),
+        ("coupling.step", f"{scenario.coupling.step_ns} ns", f"{step_ns} ns"),
     ):
         if wanted != there:
             raise InputError(

@@ -31,8 +31,8 @@ from linkwind.log.contents import (
     WRENCH,
 )  # fmt: skip
 from linkwind.log.reader import Log
+from linkwind.log.scenarios import recorded
 from linkwind.runs.playback import Pace, Steering
-from linkwind.scenario import from_json
 
 if TYPE_CHECKING:
     from linkwind.bus.zenoh import ZenohPlayer
@@ -126,7 +126,7 @@ def replay(
     steering = steering or Steering()
     topics = _topics(log, selection)
     _check(log, selection, topics, steering)
-    timeout = from_json(log.scenario_json).bus.start_timeout
+    timeout = recorded(log).bus.start_timeout
     keys = {topic: _key(topic) for topic in topics if topic not in (STATE, STEP, TIMING)}
     player = ZenohPlayer(
         log.run,
@@ -322,4 +322,4 @@ def _check(log: Log, selection: Selection, topics: Sequence[str], steering: Stee
             "got none. Change --start, --end or --topics."
         )
     steering.begin_ns = first[0]
-    steering.end_ns = int(min(high, log.steps * from_json(log.scenario_json).coupling.step_ns))
+    steering.end_ns = int(min(high, log.steps * recorded(log).coupling.step_ns))

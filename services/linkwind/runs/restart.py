@@ -21,6 +21,7 @@ from linkwind.errors import LinkwindError, LogError, ScenarioError
 from linkwind.log.contents import LOG, MOTION
 from linkwind.log.head import is_blank
 from linkwind.log.reader import Log, open_log
+from linkwind.log.scenarios import recorded
 from linkwind.log.sink import alone
 from linkwind.native.library import library_sha256
 from linkwind.report import write_report
@@ -31,7 +32,7 @@ from linkwind.runs.record import exchanges
 from linkwind.runs.resume import Plan, Resumed, plan, resume_here
 from linkwind.runs.run import Ends, Outcome, Progress, checked, dynamics, with_elsewhere
 from linkwind.runs.watch import Watch
-from linkwind.scenario import Scenario, from_json
+from linkwind.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,7 @@ def _opened(path: Path) -> Log | None:
 def _check_same(log: Log, scenario: Scenario, run_id: str) -> None:
     """Raise LogError unless a log is of a run of this scenario, however that is done."""
     try:
-        others = [key for key in differences(from_json(log.scenario_json), scenario) if not _is_how(key)]
+        others = [key for key in differences(recorded(log), scenario) if not _is_how(key)]
     except ScenarioError:
         others = ["a scenario of another version"]
     if log.changes:

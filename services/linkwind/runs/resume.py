@@ -23,6 +23,7 @@ from linkwind.dynamics.service import DynamicsService
 from linkwind.errors import InputError, LogError
 from linkwind.log.contents import CHANGES, RESUMED_STEP, RETURNS, SUBSTITUTED
 from linkwind.log.reader import Log
+from linkwind.log.scenarios import recorded, recorded_changes
 from linkwind.log.writer import LogWriter
 from linkwind.mechanism import build
 from linkwind.runs import folder as folders
@@ -91,7 +92,7 @@ def plan(log: Log, from_step: int | None = None, overrides: Sequence[str] = ()) 
             f"{log.path}: expected a run with both sides live; got one with a recorded side. Make it again "
             "from the record, with linkwind replay --substitute."
         )
-    scenario = from_json(log.scenario_json)
+    scenario = recorded(log)
     step_ns = scenario.coupling.step_ns
     last = last_step(log, step_ns)
     if from_step is not None and not 0 <= from_step <= last:
@@ -105,7 +106,7 @@ def plan(log: Log, from_step: int | None = None, overrides: Sequence[str] = ()) 
             "--from-step K and --set KEY=VALUE, or go on with --set time.end=T."
         )
     last = last if from_step is None else from_step
-    changes = {step: from_json(text) for step, text in log.changes.items() if step <= last}
+    changes = {step: each for step, each in recorded_changes(log).items() if step <= last}
     scenario, changes = _settings(scenario, changes, last, overrides)
     found = Plan(log, scenario, changes, last, max(_checkpoints(log, step_ns, last), default=-1))
     if found.steps < last:

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 
 from linkwind.log.contents import CHANGES, RECORD, SUBSTITUTED
 from linkwind.log.reader import Log
-from linkwind.scenario import Scenario, from_json
+from linkwind.log.scenarios import recorded, recorded_changes
+from linkwind.scenario import Scenario
 
 
 def changed(log: Log, overrides: Sequence[str]) -> tuple[Scenario, dict[int, Scenario]]:
@@ -16,8 +17,7 @@ def changed(log: Log, overrides: Sequence[str]) -> tuple[Scenario, dict[int, Sce
     Raises:
         ScenarioError: a setting is wrong.
     """
-    first = from_json(log.scenario_json, log.path.name, overrides)
-    return first, {step: from_json(text, log.path.name, overrides) for step, text in log.changes.items()}
+    return recorded(log, overrides), recorded_changes(log, overrides)
 
 
 def metadata(log: Log, live: str, changes: Mapping[int, Scenario]) -> dict[str, str]:

@@ -22,6 +22,7 @@ from linkwind.errors import InputError, LinkwindError, LogError, StoppedError
 from linkwind.log.contents import DYNAMICS, STATE, SUBSTITUTED
 from linkwind.log.difference import Difference
 from linkwind.log.reader import Log, open_log
+from linkwind.log.scenarios import recorded, recorded_changes
 from linkwind.log.versions import versions
 from linkwind.mechanism import Mechanism, build
 from linkwind.native.library import library_sha256
@@ -30,7 +31,7 @@ from linkwind.runs.here import inprocess_link
 from linkwind.runs.live_provider import RecordedMotion
 from linkwind.runs.own import refuse_missing
 from linkwind.runs.recorded import DifferError, LogEndsError, RecordedWrenches
-from linkwind.scenario import Scenario, from_json
+from linkwind.scenario import Scenario
 
 Progress = Callable[[int], None]
 
@@ -111,12 +112,7 @@ def verify(
 def scenario_of(log: str | Path) -> tuple[Log, Scenario]:
     """Open a log and return it with the scenario that it contains."""
     opened = open_log(log)
-    return opened, from_json(opened.scenario_json)
-
-
-def changes_of(log: Log) -> dict[int, Scenario]:
-    """Return the scenarios that a resumed run went on with, each by the step after which it counts."""
-    return {step: from_json(text) for step, text in log.changes.items()}
+    return opened, recorded(opened)
 
 
 def orders_of(log: Log, scenario: Scenario) -> dict[str, int]:
@@ -150,7 +146,9 @@ def _again(
     """
     live = log.metadata.get(SUBSTITUTED, DYNAMICS)
     if live == DYNAMICS:
-        service = DynamicsService(scenario, mechanism, log.run, changes_of(log), orders_of(log, scenario))
+        service = DynamicsService(
+            scenario, mechanism, log.run, recorded_changes(log), orders_of(log, scenario)
+        )
         session = service.session
         recorder = Recorder(comparison, scenario, mechanism, service.multibody)
         if recorded:
@@ -165,7 +163,7 @@ def _again(
             f"{log.path}: --from-recorded-wrenches: expected a log whose motion follows from its wrenches; "
             f'got one of "{live}" against recorded motion. Leave the option away.'
         )
-    motion = RecordedMotion(log, scenario, changes_of(log), live)
+    motion = RecordedMotion(log, scenario, recorded_changes(log), live)
     bus = inprocess_link(motion.session, own)
     return bus, lambda progress: motion.run(bus, comparison, progress).final_state_sha256
 
