@@ -93,7 +93,7 @@ enum { LW_AERO_PLATE, LW_AERO_FIELD };
 extern const int32_t lw_fmu_aero_model;
 extern const int32_t lw_fmu_coefficients; /* LW_PLATE_RISTROPH or LW_PLATE_ANDERSEN */
 extern const int32_t lw_fmu_gust_count;
-extern const double lw_fmu_gusts[];       /* (gust_count, 8) as lw_wind.h */
+extern const double lw_fmu_gusts[];       /* (gust_count, 9) as lw_wind.h */
 extern const int32_t lw_fmu_field_start[]; /* (n + 1) as lw_field.h; the bodies are 0 ... n - 1 */
 extern const int32_t lw_fmu_field_code[];
 extern const double lw_fmu_field_constants[];

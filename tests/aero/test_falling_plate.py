@@ -17,7 +17,7 @@ GRAVITY = 1.0
 def fall(i_star, coefficients, duration=60.0, h=0.02):
     """Angles over time of a plate (c = s = ρ = 1) let go at 0.3 rad; classical Runge–Kutta."""
     mass = i_star * np.pi / 4
-    calm = WindTable(np.zeros(3), np.zeros((0, 8)))
+    calm = WindTable(np.zeros(3), np.zeros((0, 9)))
     plates = Plates(PlateTable(np.zeros(1, dtype=np.int32), np.ones((1, 2)), coefficients, 1.0, calm))
     motion, wrench = Motion.at_rest(1), Wrench.zeros(1, added_inertia=True)
 

@@ -8,7 +8,7 @@ from linkwind.spatial import Motion, Wrench
 
 RNG = np.random.default_rng(21)
 DENSITY, CHORD, SPAN = 1.3, 0.4, 0.7
-CALM = WindTable(np.zeros(3), np.zeros((0, 8)))
+CALM = WindTable(np.zeros(3), np.zeros((0, 9)))
 SETS = list(Coefficients)
 
 
@@ -80,7 +80,7 @@ def random_state():
 
 
 def random_wind():
-    gusts = RNG.normal(size=(2, 8))
+    gusts = np.column_stack([RNG.normal(size=(2, 8)), [0.0, 1.0]])
     return WindTable(RNG.normal(size=3), gusts)
 
 

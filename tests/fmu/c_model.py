@@ -189,7 +189,7 @@ def aero(table: PlateTable | FieldTable, theta=(), *, scalar=False) -> Model:
         "ADDED_INERTIA": 36 * n,
     }
     start = {"ORIENTATION": np.tile([1.0, 0.0, 0.0, 0.0], n)}
-    gusts, field, coefficients = np.zeros((0, 8)), [[0], [0], [0.0]], 0
+    gusts, field, coefficients = np.zeros((0, 9)), [[0], [0], [0.0]], 0
     if plate:
         start |= {"DENSITY": table.density, "WIND": table.wind.uniform}
         start |= {"LENGTH": table.size[:, 0], "SPAN": table.size[:, 1]}

@@ -58,7 +58,11 @@ def set_motion(fmu: Instance, motion: Motion) -> None:
 @pytest.fixture(scope="module")
 def plate(compiler):
     scenario = load(
-        "two_link", ["environment.gusts=[{amplitude=[0.5,0.2,0],frequency=2,wavenumber=[0.3,0,0]}]"]
+        "two_link",
+        [
+            "environment.gusts=[{amplitude=[0.5,0.2,0],frequency=2,wavenumber=[0.3,0,0]},"
+            "{shape='one_minus_cosine',amplitude=[0.5,0.2,0],frequency=2,wavenumber=[0.3,0,0],phase_deg=90}]"
+        ],
     )
     table = plate_table(scenario, scenario.providers[0])
     model = aero(table)

@@ -20,7 +20,7 @@ from linkwind.native.forces import (
 from linkwind.spatial import Motion, Wrench
 
 RNG = np.random.default_rng(20)
-CALM = WindTable(np.zeros(3), np.zeros((0, 8)))
+CALM = WindTable(np.zeros(3), np.zeros((0, 9)))
 
 
 def header(name, folder):
@@ -52,16 +52,18 @@ def test_coefficient_sets_are_those_of_the_c_header():
 
 
 def random_wind(n=3):
-    gusts = RNG.normal(size=(n, 8))
+    gusts = RNG.normal(size=(n, 9))
     gusts[:, 3] *= 5.0
+    gusts[:, 8] = np.arange(n) % 2
     return WindTable(RNG.normal(size=3), gusts)
 
 
 def written_out(wind, t, r):
     velocity = wind.uniform.copy()
-    for ax, ay, az, frequency, kx, ky, kz, phase in wind.gusts:
+    for ax, ay, az, frequency, kx, ky, kz, phase, shape in wind.gusts:
         angle = 2 * np.pi * (frequency * t + kx * r[0] + ky * r[1] + kz * r[2]) + phase
-        velocity += np.array([ax, ay, az]) * np.sin(angle)
+        single = (1 - np.cos(angle)) / 2 if 0 <= angle <= 2 * np.pi else 0.0
+        velocity += np.array([ax, ay, az]) * (single if shape else np.sin(angle))
     return velocity
 
 
@@ -80,8 +82,22 @@ def test_wind_is_the_stated_sum_and_its_rate_the_derivative_along_the_path():
         np.testing.assert_allclose(rate, difference, rtol=0, atol=2e-7 * max(1, abs(rate).max()))
 
 
+def test_a_single_gust_rises_and_falls_once():
+    """14 CFR 25.341: U = peak/2 (1 - cos(π s/H)) for s from 0 to 2 H, here flown through at 20 m/s."""
+    peak, half, speed = 12.0, 30.0, 20.0
+    gust = [[0.0, peak, 0.0, 0.0, 1.0 / (2.0 * half), 0.0, 0.0, 0.0, 1.0]]
+    wind = WindTable(np.zeros(3), np.array(gust))
+    for s in (-1.0, -1e-9, 0.0, 10.0, half, 50.0, 2.0 * half, 2.0 * half + 1e-9, 100.0):
+        inside = 0.0 <= s <= 2.0 * half
+        velocity, rate = wind_at(wind, 7.0, np.array([s, 3.0, 0.0]), np.array([speed, 0.0, 0.0]))
+        expected = 0.5 * peak * (1.0 - np.cos(np.pi * s / half)) if inside else 0.0
+        slope = 0.5 * peak * np.pi / half * np.sin(np.pi * s / half) if inside else 0.0
+        np.testing.assert_allclose(velocity, [0.0, expected, 0.0], rtol=0, atol=1e-13)
+        np.testing.assert_allclose(rate, [0.0, speed * slope, 0.0], rtol=0, atol=1e-13)
+
+
 def test_wind_without_gusts_is_uniform_and_steady():
-    velocity, rate = wind_at(WindTable(np.array([1.0, 2.0, 3.0]), np.zeros((0, 8))), 1.0, *np.ones((2, 3)))
+    velocity, rate = wind_at(WindTable(np.array([1.0, 2.0, 3.0]), np.zeros((0, 9))), 1.0, *np.ones((2, 3)))
     assert velocity.tolist() == [1.0, 2.0, 3.0]
     assert rate.tolist() == [0.0, 0.0, 0.0]
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import logging
-import math
 import struct
 from pathlib import Path
 
 import numpy as np
 
 from linkwind.aero.base import Capabilities, body_indices, item
+from linkwind.aero.wind import wind_table
 from linkwind.errors import InputError, ProtocolError, SimulationError
 from linkwind.fmi.host import description, listing, mapping
 from linkwind.fmi.host.derivatives import Derivatives
@@ -18,7 +18,8 @@ from linkwind.fmi.host.instances import Instances
 from linkwind.fmi.host.links import Mapping, elements
 from linkwind.fmi.host.planning import differentiates, interface, own_step_ns, stepping
 from linkwind.fmi.host.transfer import Inputs, Outputs
-from linkwind.scenario import Environment, Provider, Scenario
+from linkwind.native.forces import wind_at
+from linkwind.scenario import Provider, Scenario
 from linkwind.scenario.providers import FmuModel
 from linkwind.spatial import Array, Motion, Wrench
 
@@ -102,8 +103,12 @@ class ForceFmu:
         found = mapping.resolve(self._fmu, settings, provider.bodies)
         self._mapping = found
         bodies = body_indices(scenario, provider)
-        wind = _Wind(scenario.environment)
-        self._inputs = Inputs(found, bodies, len(scenario.bodies), wind, scenario.environment.density)
+        wind, still = wind_table(scenario.environment), np.zeros(3)
+
+        def wind_there(t: float, position: Array) -> Array:
+            return wind_at(wind, t, position, still)[0]
+
+        self._inputs = Inputs(found, bodies, len(scenario.bodies), wind_there, scenario.environment.density)
         self._outputs = Outputs(found, bodies)
         timeout = settings.timeout or scenario.coupling.timeout / 2.0
         self._instances = Instances(self._fmu, found, settings, step_ns, timeout)
@@ -208,18 +213,3 @@ class ForceFmu:
     def close(self) -> None:
         """End the FMU's process and remove what was unpacked."""
         self._instances.close()
-
-
-class _Wind:
-    """The undisturbed wind: uniform stream and gusts."""
-
-    def __init__(self, environment: Environment) -> None:
-        self._environment = environment
-
-    def __call__(self, t: float, position: Array) -> Array:
-        """Return the wind [m/s] in W at time [s] and place [m]."""
-        wind = np.array(self._environment.wind)
-        for gust in self._environment.gusts:
-            cycles = gust.frequency * t + float(np.dot(gust.wavenumber, position))
-            wind += np.array(gust.amplitude) * math.sin(2.0 * math.pi * cycles + math.radians(gust.phase_deg))
-        return wind

@@ -23,6 +23,9 @@ VARIABLES = ("t", "x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz", "theta")
 COMPONENTS = ("fx", "fy", "fz", "tx", "ty", "tz")
 
 
+GUST_SHAPES = {"sine": 0, "one_minus_cosine": 1}  # fmu/aero/lw_wind.h
+
+
 class Coefficients(enum.IntEnum):
     """Coefficient sets of the plate (``fmu/aero/lw_plate.h``)."""
 
@@ -32,11 +35,12 @@ class Coefficients(enum.IntEnum):
 
 @dataclass(frozen=True)
 class WindTable:
-    """A uniform stream with travelling gusts: U0 + Σ a sin(2π(f t + k·r) + φ).
+    """A uniform stream with travelling gusts: U0 + Σ a s(2π(f t + k·r) + φ).
 
     Attributes:
         uniform: U0 [m/s], shape (3,), in W.
-        gusts: a [m/s] (3), f [Hz], k [1/m] (3), φ [rad] of each gust, shape (n, 8), a and k in W.
+        gusts: a [m/s] (3), f [Hz], k [1/m] (3), φ [rad], shape s as ``GUST_SHAPES`` of each gust, shape
+            (n, 9), a and k in W.
     """
 
     uniform: Array

@@ -16,6 +16,7 @@ Stabilisation = Literal["none", "baumgarte", "projection"]
 IntegratorName = Literal["euler", "semi_implicit_euler", "rk4", "dopri5", "radau5"]
 Scheme = Literal["explicit", "pec", "implicit"]
 Acceleration = Literal["aitken", "iqn_ils"]
+GustShape = Literal["sine", "one_minus_cosine"]
 Transport = Literal["zenoh", "inprocess"]
 
 ZERO = (0.0, 0.0, 0.0)
@@ -36,9 +37,13 @@ class Time(Section):
 
 
 class Gust(Section):
-    """A travelling wave on top of the wind: amplitude · sin(2π(frequency·t + wavenumber·r) + phase)."""
+    """A travelling wave on top of the wind: amplitude · shape(2π(frequency·t + wavenumber·r) + phase)."""
 
-    amplitude: Vector = quantity("Amplitude of the wind's change", "m/s")
+    shape: GustShape = Field(
+        default="sine",
+        description="sine: a wave without end; one_minus_cosine: a single gust, (1 − cos)/2 over one cycle",
+    )
+    amplitude: Vector = quantity("Amplitude of the wind's change; of a single gust, its peak", "m/s")
     frequency: float = quantity("Frequency at a fixed place", "Hz")
     wavenumber: Vector = quantity("Cycles per metre along x, y, z", "1/m", ZERO)
     phase_deg: float = quantity("Phase at t = 0 at the origin", "deg", 0.0)
