@@ -25,6 +25,8 @@ SLOW = (
     "tests/fmu/test_c_fuzz.py",
     "tests/native/test_compilers.py",
     "tests/networks",
+    "tests/own/test_runs.py::test_a_hidden_memory",
+    "tests/own/test_runs.py::test_a_provider_in_python_that_is_killed",
     "tests/runs/test_damaged.py",
     "tests/runs/test_replay.py::test_interrupted",
     "tests/runs/test_replay.py::test_many_messages",
