@@ -6,6 +6,7 @@ import ast
 import functools
 import hashlib
 import inspect
+import re
 import sys
 import traceback
 from contextvars import ContextVar
@@ -87,9 +88,17 @@ class PythonSource:
         assert self.file is not None
         module = _executed(self.file, self.code)
         if not hasattr(module, self.name):
-            names = ", ".join(_defined(self.code)) or "nothing"
-            raise InputError(f"{self.file}: expected one of {names}; got {self.name}. Correct the name.")
+            raise self._unknown()
         return getattr(module, self.name)
+
+    def check_name(self) -> None:
+        """Raise InputError if the file, which is not executed, cannot have the name."""
+        if not re.search(rf"\b{re.escape(self.name)}\b|import \*".encode(), self.code):
+            raise self._unknown()
+
+    def _unknown(self) -> InputError:
+        names = ", ".join(_defined(self.code)) or "nothing"
+        return InputError(f"{self.file}: expected one of {names}; got {self.name}. Correct the name.")
 
 
 def python_source(model: object) -> PythonSource:
@@ -135,7 +144,9 @@ def _named(text: str) -> PythonSource:
     if not path:
         choices = ", ".join(f"{file}:{name}" for name in names) or f"{file}:NAME"
         raise InputError(f"{text}: expected FILE.py:NAME, such as {choices}; got no name. Add it.")
-    return PythonSource(name, file, code)
+    source = PythonSource(name, file, code)
+    source.check_name()
+    return source
 
 
 def _defined(code: bytes) -> list[str]:
