@@ -251,8 +251,8 @@ def test_what_is_no_model_is_refused(model, error):
         ("def f(t, m, w): ...", "g", r"mine\.py: expected one of f; got g"),
         ("def f(t, m, w):\n    g = 1", "g", r"mine\.py: expected one of f; got g"),
         ("x = 1\ndef f(:\n", "f", r"mine\.py:2: expected Python; got: invalid syntax"),
-        ("import numpy\n1/0", "f", r"mine\.py:2, in <module>: ZeroDivisionError"),
-        ("raise SystemExit(3)", "f", r"mine\.py:1, in <module>: SystemExit: 3"),
+        ("import numpy\n1/0\nf = 1", "f", r"mine\.py:2, in <module>: ZeroDivisionError"),
+        ("raise SystemExit(3)\nf = 1", "f", r"mine\.py:1, in <module>: SystemExit: 3"),
         (
             "import linkwind\ndef f(t, m, w): ...\nlinkwind.run(linkwind.load('chain'), models={'aero': f})",
             "f",
