@@ -86,7 +86,7 @@ def test_what_was_left_out_is_named(tmp_path):
     assert left["armatures"] == ["hip_y"]
     assert left["joint frictions"] == ["knee"]
     assert left["equality constraints"] == ["geared"]
-    assert (left["tendons"], left["actuators"], left["sensors"]) == (["cord"], ["m"], ["gyro"])
+    assert (left["tendons"], left["sensors"]) == (["cord"], ["gyro"])
     assert left["contacts"] == ["world", "trunk", "thigh", "shin", "foot", "toe"]
 
 

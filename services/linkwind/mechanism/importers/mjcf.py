@@ -13,6 +13,7 @@ import numpy as np
 
 from linkwind.errors import InputError
 from linkwind.mechanism.importers.model import ORIGIN, WORLD, Closure, Joint, Model, Part, Picture, Pose
+from linkwind.mechanism.importers.motors import add_motors
 from linkwind.mechanism.quaternion import inverse, matrix, product
 from linkwind.native.tables import NQ, NV
 
@@ -74,6 +75,7 @@ class _Reader:
             last[body] = len(model.parts) - 1
         self._note_left_out(model)
         self._add_closures(model, last)
+        add_motors(model, self.mujoco, m)
         return model
 
     def _name(self, kind: str, index: int) -> str:
@@ -208,6 +210,9 @@ class _Reader:
         out("joint limits", "spherical joints have no end", _each(joints, cones))
         out("joint frictions", "dry friction is not modelled", _each(of, m.dof_frictionloss))
         out("armatures", "rotors have no inertia: the motion is another", _each(of, m.dof_armature))
+        rotors = getattr(m, "actuator_armature", np.zeros(0))  # of a later version of MuJoCo
+        actuators = [self._name("ACTUATOR", i) for i in range(len(rotors))]
+        out("armatures", "rotors have no inertia: the motion is another", _each(actuators, rotors))
         out(
             "springs not linear",
             "only their linear part is there",
@@ -220,7 +225,6 @@ class _Reader:
         )
         for what, why, kind, count in (
             ("tendons", "there are none, nor their springs, dampers and limits", "TENDON", m.ntendon),
-            ("actuators", "joints have no motors", "ACTUATOR", m.nu),
             ("sensors", "they do not matter to the motion", "SENSOR", m.nsensor),
             ("keyframes", "the start is the joints' zero, or --at", "KEY", m.nkey),
             ("flexible bodies", "bodies are rigid: their vertices fly apart", "FLEX", m.nflex),

@@ -142,6 +142,23 @@ class Closure:
 
 
 @dataclass
+class Motor:
+    """What drives a joint.
+
+    Attributes:
+        name: as in the file.
+        joint: name of a revolute or prismatic joint, as in the file.
+        law: force or torque along its coordinate, an expression of its input u, of q and v.
+        unit: of that.
+    """
+
+    name: str
+    joint: str
+    law: str
+    unit: str
+
+
+@dataclass
 class Model:
     """A file, read.
 
@@ -150,6 +167,7 @@ class Model:
         name: of the robot, as in the file.
         parts: parents before children.
         closures: what closes loops.
+        motors: what drives joints.
         gravity: [m/s²], shape (3,).
         pictures: what is drawn of what stands still.
         remarks: what was left out or changed.
@@ -160,6 +178,7 @@ class Model:
     parts: list[Part]
     gravity: Array
     closures: list[Closure] = field(default_factory=list)
+    motors: list[Motor] = field(default_factory=list)
     pictures: list[Picture] = field(default_factory=list)
     remarks: list[Remark] = field(default_factory=list)
 

@@ -29,6 +29,10 @@ def settle(model: Model, file: Path, repair: bool) -> None:
     inside = [closure for closure in model.closures if len(set(closure.ends)) == 1]
     model.leave_out("loops", "both ends are in one body", [closure.name for closure in inside])
     model.closures = [closure for closure in model.closures if closure not in inside]
+    joints = {part.joint.name for part in model.parts}
+    gone = [motor.name for motor in model.motors if motor.joint not in joints]
+    model.leave_out("actuators", "their joints are left out", gone)
+    model.motors = [motor for motor in model.motors if motor.joint in joints]
     if not model.parts:
         raise InputError(f"{file}: expected a link with mass; got none. Give links inertials.")
     for part in model.parts:

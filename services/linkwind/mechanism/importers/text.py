@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from linkwind.mechanism.importers.configuration import displacements
-from linkwind.mechanism.importers.model import WORLD, Closure, Model, Part, Picture, Pose
+from linkwind.mechanism.importers.model import WORLD, Closure, Model, Motor, Part, Picture, Pose
 from linkwind.mechanism.quaternion import from_matrix
 from linkwind.mechanism.remarks import comment, wrapped
 from linkwind.spatial import Array
@@ -40,6 +40,9 @@ def scenario_text(model: Model, source: str, version: str, start: Mapping[str, f
             lines += ["", *_joint(part, joints[i], bodies[i], *frames[part.parent])]
     for closure, name in zip(model.closures, names([c.name for c in model.closures], joints), strict=True):
         lines += ["", *_closure(closure, name, frames)]
+    driven = {part.joint.name: joint for part, joint in zip(model.parts, joints, strict=True)}
+    for motor, name in zip(model.motors, names([m.name for m in model.motors]), strict=True):
+        lines += ["", *_motor(motor, name, driven[motor.joint])]
     return "\n".join(lines) + "\n"
 
 
@@ -155,6 +158,15 @@ def _closure(closure: Closure, name: str, frames: Mapping[int, tuple[str, Array]
     yield f'child = "{child}"'
     yield f"parent_point = {_row(closure.points[way[0]] - parent_centre)}    # m"
     yield f"child_point = {_row(closure.points[way[1]] - child_centre)}    # m"
+
+
+def _motor(motor: Motor, name: str, joint: str) -> Iterator[str]:
+    yield "[[forces]]"
+    yield 'type = "actuator"'
+    yield f'name = "{name}"' + ("" if name == motor.name else f"    # {_string(motor.name)} in the file")
+    yield f'joint = "{joint}"'
+    yield "inputs = { u = 0.0 }              # an input of the FMU; in a run it stays what it is here"
+    yield f"force = {_string(motor.law)}    # {motor.unit}"
 
 
 def _any(value: float | list[float]) -> str:
