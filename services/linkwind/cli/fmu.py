@@ -14,6 +14,7 @@ from linkwind.cli.options import DIFFERENT, JsonOption, ScenarioArgument, SetOpt
 
 if TYPE_CHECKING:
     from linkwind.fmi.check import Checked
+    from linkwind.scenario import Scenario
 
 FileArgument = Annotated[Path, typer.Argument(help="The FMU.")]
 
@@ -77,17 +78,33 @@ def export(
     arrays: Annotated[
         ArraysChoice, typer.Option(help="Arrays in FMI 3; scalar for tools that have none.")
     ] = ArraysChoice.NATIVE,
+    ssp: Annotated[
+        bool,
+        typer.Option(
+            "--ssp", help="Mechanism and force models, connected, as SCENARIO.ssp (SSP 1.0, FMI 2)."
+        ),
+    ] = False,
     set_: SetOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Write a scenario's mechanism as an FMU: Co-Simulation and Model Exchange, C inside.
 
     Example: linkwind fmu export two_link -o two_link.fmu --fmi 3 --platforms all
+
+    Example: linkwind fmu export two_link --ssp
     """
     from linkwind.fmi.export import export as export_fmu
     from linkwind.scenario import load
 
+    if ssp and (fmi is Fmi.THREE or part is PartChoice.AERO):
+        given = "--fmi 3" if fmi is Fmi.THREE else "--part aero"
+        raise typer.BadParameter(
+            f"--ssp: expected nothing that chooses one FMU; got {given}. Leave one of them out."
+        )
     loaded = load(scenario, set_ or [])
+    if ssp:
+        _export_system(loaded, out or Path(f"{loaded.name}.ssp"), platforms.split(","), as_json=as_json)
+        return
     ending = "_aero" if part is PartChoice.AERO else ""
     done = export_fmu(
         loaded,
@@ -104,6 +121,24 @@ def export(
     typer.echo(
         f"wrote {done.file}: FMI {done.fmi}, {done.bytes / 1000:.0f} kB, for {', '.join(done.platforms)}"
     )
+
+
+def _export_system(scenario: Scenario, out: Path, platforms: list[str], *, as_json: bool) -> None:
+    from linkwind.fmi.ssp import export_system
+
+    done = export_system(scenario, out, platforms=platforms)
+    if as_json:
+        summary = {"file": str(done.file), "bytes": done.bytes, "fmi": done.fmi}
+        names = {"platforms": done.platforms, "components": done.components, "left_out": done.left_out}
+        typer.echo(json.dumps(summary | {key: list(value) for key, value in names.items()}))
+        return
+    parts = " and ".join(done.components)
+    typer.echo(
+        f"wrote {done.file}: {parts}, FMI {done.fmi}, {done.bytes / 1000:.0f} kB, for "
+        f"{', '.join(done.platforms)}"
+    )
+    for name in done.left_out:
+        typer.echo(f"left out: provider {name}, whose model is not in C; its forces are inputs of the system")
 
 
 def check(file: FileArgument, as_json: JsonOption = False) -> None:

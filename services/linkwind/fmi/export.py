@@ -70,17 +70,26 @@ def export(
             scenario without such a part.
     """
     names = toolchain.choose(platforms)
-    content = content_of(scenario, fmi=fmi, part=part, arrays=arrays)
+    fmu = archive(_part(scenario, fmi, part, arrays), fmi, platforms)
+    file = Path(out)
+    write(file, fmu)
+    return Exported(file, len(fmu), fmi, tuple(names))
+
+
+def archive(part: Part, fmi: FmiVersion, platforms: Sequence[str]) -> bytes:
+    """Return an FMU; see `export`."""
+    content = _content(part, fmi)
     sources = {
         name.removeprefix("sources/"): text for name, text in content.items() if name.startswith("sources/")
     }
-    identifier = _identifier(content)
-    portable = tuple(platforms) != ("host",)
-    content |= build.binaries(sources, names, identifier, fmi, portable=portable)
-    archive = _zip(content)
-    file = Path(out)
-    _write(file, archive)
-    return Exported(file, len(archive), fmi, tuple(names))
+    names, portable = toolchain.choose(platforms), tuple(platforms) != ("host",)
+    content |= build.binaries(sources, names, part.identifier, fmi, portable=portable)
+    return zipped(content, "modelDescription.xml")
+
+
+def _part(scenario: Scenario, fmi: FmiVersion, part: PartName, arrays: Arrays) -> Part:
+    make = dynamics_part if part == "dynamics" else aero_part
+    return make(scenario, native_arrays=fmi == "3" and arrays == "native")
 
 
 def content_of(
@@ -91,8 +100,10 @@ def content_of(
     Raises:
         InputError: the scenario does not have the part.
     """
-    make = dynamics_part if part == "dynamics" else aero_part
-    chosen = make(scenario, native_arrays=fmi == "3" and arrays == "native")
+    return _content(_part(scenario, fmi, part, arrays), fmi)
+
+
+def _content(chosen: Part, fmi: FmiVersion) -> dict[str, bytes]:
     sources = build.c_sources(chosen, fmi)
     own = sorted(name for name in (*sources, build.DATA_FILE) if name.endswith(".c"))
     token = _token(chosen, fmi, sources, own)
@@ -156,28 +167,29 @@ def _build_description(part: Part, own: Sequence[str]) -> bytes:
     return to_bytes(root)
 
 
-def _identifier(content: Mapping[str, bytes]) -> str:
-    return ET.fromstring(content["modelDescription.xml"]).attrib["modelName"]
-
-
-def _zip(content: Mapping[str, bytes]) -> bytes:
-    """Return the archive; the model description first, so that it is found at once, and fixed dates."""
-    archive = io.BytesIO()
-    names = sorted(content, key=lambda name: (name != "modelDescription.xml", name))
-    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as target:
+def zipped(content: Mapping[str, bytes], description: str) -> bytes:
+    """Return the archive; the description first, so that it is found at once, and fixed dates."""
+    memory = io.BytesIO()
+    names = sorted(content, key=lambda name: (name != description, name))
+    with zipfile.ZipFile(memory, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as target:
         for name in names:
             entry = zipfile.ZipInfo(name, _EPOCH)
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.create_system = 3  # Unix, wherever this runs
             entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
             target.writestr(entry, content[name], compresslevel=9)
-    return archive.getvalue()
+    return memory.getvalue()
 
 
-def _write(out: Path, archive: bytes) -> None:
+def write(out: Path, content: bytes) -> None:
+    """Write the file, whole or not at all.
+
+    Raises:
+        InputError: it cannot be written.
+    """
     partial = out.with_name(out.name + ".partial")
     try:
-        partial.write_bytes(archive)
+        partial.write_bytes(content)
         partial.replace(out)
     except OSError as error:
         raise InputError(

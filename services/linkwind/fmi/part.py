@@ -57,7 +57,7 @@ class Part:
     def identifier(self) -> str:
         """The model identifier: a C identifier, and the name of the binaries."""
         name = re.sub(r"\W", "_", self.scenario.name, flags=re.ASCII)
-        ending = "_aero" if self.name == "aero" else ""
+        ending = f"_{self.provider.name}" if self.provider else ""
         return ("m_" if name[0].isdigit() else "") + name + ending
 
     @property
@@ -157,6 +157,11 @@ def aero_part(scenario: Scenario, *, native_arrays: bool) -> Part:
             f"{scenario.source}: providers: expected one with model plate or field, to export it; got "
             f"{models}. Export the other half with --part dynamics."
         )
+    return provider_part(scenario, provider, native_arrays=native_arrays)
+
+
+def provider_part(scenario: Scenario, provider: Provider, *, native_arrays: bool) -> Part:
+    """Return the force model of a provider, which is one of those in C, `EXPORTABLE`."""
     mechanism = build(scenario)
     variables = aero.variables(scenario, provider, mechanism)
     n = len(provider.bodies)
