@@ -34,6 +34,10 @@ def pages(tmp_path_factory):
     runs["diverged"] = dataclasses.replace(
         planar(400, name="diverged"), trajectory=diverged, complete=False, error="NaN"
     )
+    away = runs["planar"].trajectory.position + np.array([12345.0, 0.0, 0.0])
+    runs["far"] = dataclasses.replace(
+        planar(400, name="far"), trajectory=runs["planar"].trajectory._replace(position=away)
+    )
     flow = survey("aero", lambda: wake(planar(400), every=50, rows=56, columns=64))
     runs["flow"] = dataclasses.replace(planar(400, name="flow"), flows=(flow,))
     for name, run in runs.items():
@@ -169,6 +173,33 @@ def test_a_scene_in_three_dimensions_turns_with_a_drag(browser, pages):
     browser.mouse("mouseMoved", 330, 480, 1)
     browser.mouse("mouseReleased", 330, 480)
     assert picture(browser) != before
+
+
+# Writes down the ends of every text on the canvas, and how wide that is.
+WRITES = """(() => {
+  const { prototype } = CanvasRenderingContext2D, write = prototype.fillText;
+  window.texts = [];
+  prototype.fillText = function (text, x, y) {
+    const wide = this.measureText(text).width, left = this.textAlign === "center" ? x - wide / 2 : x;
+    texts.push([left, left + wide, this.canvas.clientWidth, text]);
+    return write.call(this, text, x, y);
+  };
+})()"""
+
+
+def test_the_numbers_of_the_grid_are_told_apart_and_none_is_cut(browser, pages):
+    browser.open(pages / "far.html")
+    browser.evaluate(WRITES)
+    browser.evaluate("follow.checked = true; follow.dispatchEvent(new Event('change'))")
+    for frame in (100, 200, 300):
+        browser.evaluate("texts.length = 0")
+        scrub(browser, frame)
+        written = browser.until("texts.length && texts")
+        assert [text for left, right, wide, text in written if left < 0 or right > wide] == []
+        texts = [text for *_, text in written]
+        numbers = [text for text in texts[: texts.index("m")] if text.startswith("1234")]  # of one picture
+        assert len(numbers) > 3
+        assert len(set(numbers)) == len(numbers)
 
 
 def test_the_page_follows_the_colour_scheme(page):

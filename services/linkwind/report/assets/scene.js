@@ -55,7 +55,8 @@ export function makeScene(canvas, motion, clock) {
     pen.fillStyle = colour("soft");
     pen.lineWidth = 1;
     pen.globalAlpha = 1;
-    const text = (value) => `${number(Math.abs(value) < step / 2 ? 0 : value)}`.replace("-", "−");
+    const decimals = Math.max(0, Math.ceil(-Math.log10(step) - 1e-9));
+    const text = (value) => (Math.abs(value) < step / 2 ? 0 : value).toFixed(decimals).replace("-", "−");
     pen.textAlign = "center";
     for (let x = Math.ceil(x0 / step) * step; x < x0 + camera.w / camera.scale; x += step) {
       const [px] = camera.project([x, 0, 0]);
