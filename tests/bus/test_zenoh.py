@@ -373,6 +373,17 @@ def test_what_is_old_does_not_give_a_silent_provider_more_time(
     double.close()
 
 
+def test_an_answer_counts_before_the_clock_is_looked_at(open_link: Callable[..., ZenohDynamicsLink]) -> None:
+    """A reader that gets no time for long finds calls to wake up, and the answer that came in time behind."""
+    link = open_link(session())
+    for _ in range(20):
+        link._wake()
+    link._session.put("linkwind/v1/r1/wrench/aero", b"an answer")
+    sample = link._receive()
+    assert sample is not None
+    assert sample.payload.to_bytes() == b"an answer"
+
+
 def test_reader_that_is_busy_does_not_fill_its_own_queue(
     endpoint: str, open_link: Callable[..., ZenohDynamicsLink], monkeypatch: pytest.MonkeyPatch
 ) -> None:
