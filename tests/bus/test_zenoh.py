@@ -388,9 +388,20 @@ def test_reader_that_is_busy_does_not_fill_its_own_queue(
     endpoint: str, open_link: Callable[..., ZenohDynamicsLink], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The watchdog wakes up a reader that waits; nobody would take away what it sent to one that does not."""
+
+    class Interrupted:
+        def try_recv(self) -> None:
+            return None
+
+        def recv(self) -> None:
+            raise KeyboardInterrupt
+
+    link = open_link(session())
+    monkeypatch.setattr(link, "_incoming", Interrupted())
+    with pytest.raises(KeyboardInterrupt):
+        link.receive()
     woken = []
     monkeypatch.setattr(ZenohDynamicsLink, "_wake", lambda self: woken.append(self._reading))
-    open_link(session())
     threading.Event().wait(0.5)
     assert woken == []
 

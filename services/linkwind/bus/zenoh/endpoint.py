@@ -116,8 +116,10 @@ class Endpoint:
         sample = self._look_for_sample(spin)
         if sample is None:
             self._reading = True
-            sample = self._incoming.recv()
-            self._reading = False
+            try:
+                sample = self._incoming.recv()
+            finally:  # Ctrl-C as well: else the watchdog fills the queue, and close() would wait for it
+                self._reading = False
         if self._troubles:
             self._raise()
         # Of a reader that was not given time for long, several calls to wake up may stand before a message.
