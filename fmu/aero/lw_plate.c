@@ -2,6 +2,8 @@
 
 #include <string.h>
 
+#include "lw_expression.h"
+
 static const double pi = 3.14159265358979323846264338327950;
 static const double degree = 0.01745329251994329576923690768489;
 
@@ -62,45 +64,97 @@ static planar_wrench andersen(double density, double chord, double span, section
     return out;
 }
 
+/* Lift, drag and moment about the middle of the chord from the curves of a table over the angle of attack. */
+static planar_wrench tabulated(const lw_plates *plates, double chord, double span, section_motion m) {
+    const double q = 0.5 * plates->density * chord * span, alpha = atan2(-m.w, m.u);
+    const double *curves = plates->curves;
+    const int size = plates->curve_size;
+    const double l = q * lw_curve(curves, alpha).value * m.speed;
+    const double d = q * lw_curve(curves + size, alpha).value * m.speed;
+    const double moment = q * chord * lw_curve(curves + 2 * size, alpha).value * m.speed * m.speed;
+    const planar_wrench out = {-l * m.w - d * m.u, l * m.u - d * m.w, moment};
+    return out;
+}
+
+static planar_wrench circulatory(const lw_plates *plates, double chord, double span, section_motion m) {
+    switch (plates->coefficients) {
+    case LW_PLATE_ANDERSEN: return andersen(plates->density, chord, span, m);
+    case LW_PLATE_TABLE: return tabulated(plates, chord, span, m);
+    default: return ristroph(plates->density, chord, span, m);
+    }
+}
+
 /* Kirchhoff's equations for the added momentum p = m_n w n and angular momentum I_a omega_z e_z, less the
- * terms in the body's own acceleration: force -dp/dt, torque -d(I_a omega_z e_z)/dt - v x p. */
-static void add_added_mass(double mass, double inertia, lw_vec3 v, lw_vec3 omega, double air_rate,
+ * terms in the body's own acceleration: force -dp/dt, torque -d(I_a omega_z e_z)/dt - v x p. The rate is that
+ * of the air along n, less what of the centre's acceleration is none of the body's. */
+static void add_added_mass(double mass, double inertia, lw_vec3 v, lw_vec3 omega, double rate,
                            lw_vec3 *force, lw_vec3 *torque) {
     const double p = mass * v.y;
     const lw_vec3 turn = lw_vec(-omega.z, 0.0, omega.x); /* omega x n */
     *force = lw_sub(*force, lw_scale(p, turn));
-    force->y += mass * (air_rate - lw_dot(v, turn));
+    force->y += mass * (rate - lw_dot(v, turn));
     torque->x += v.z * p - inertia * omega.z * omega.y;
     torque->y += inertia * omega.z * omega.x;
     torque->z -= v.x * p;
 }
 
+/* How a plate moves: in W, and its angular velocity in the body frame as well. */
+typedef struct {
+    lw_vec3 position, linear, angular;
+    lw_mat3 rotation;
+    lw_vec3 omega;
+} plate_motion;
+
+/* Force on a strip whose centre is at z of the span, and torque about the plate's centre, in the body frame.
+ * Where z is zero nothing is added to anything, so that one strip has the bits of a plate without strips. */
+static void strip_wrench(const lw_plates *plates, double t, const plate_motion *plate, double chord,
+                         double span, double z, lw_vec3 *force, lw_vec3 *torque) {
+    const lw_vec3 omega = plate->omega;
+    lw_vec3 position = plate->position, velocity = plate->linear;
+    if (z != 0.0) {
+        const lw_vec3 arm = lw_mat_vec(plate->rotation, lw_vec(0.0, 0.0, z));
+        position = lw_add(position, arm);
+        velocity = lw_add(velocity, lw_cross(plate->angular, arm));
+    }
+    const lw_wind_sample air = lw_wind_at(&plates->wind, t, position, velocity);
+    const lw_vec3 v = lw_mat_tvec(plate->rotation, lw_sub(velocity, air.velocity));
+    double rate = lw_mat_tvec(plate->rotation, air.rate).y;
+    const section_motion section = {v.x, v.y, sqrt(v.x * v.x + v.y * v.y), omega.z};
+    const planar_wrench planar = circulatory(plates, chord, span, section);
+    const lw_added_mass added = lw_plate_added_mass(plates->density, chord, span, 1);
+    *force = lw_vec(planar.x, planar.y, 0.0), *torque = lw_vec(0.0, 0.0, planar.torque);
+    if (z != 0.0) rate -= z * omega.y * omega.z; /* (omega x (omega x r)) . n */
+    add_added_mass(added.normal, added.span, v, omega, rate, force, torque);
+    if (z != 0.0) *torque = lw_add(*torque, lw_vec(-z * force->y, z * force->x, 0.0));
+}
+
 static int evaluate(const lw_plates *plates, int i, double t, const lw_motion *motion,
                     lw_unaligned *force, lw_unaligned *torque) {
     const int32_t b = plates->body[i];
+    const int n = plates->strips;
     const double chord = plates->size[2 * i], span = plates->size[2 * i + 1];
-    const lw_mat3 rotation = lw_quat_matrix(lw_load4(motion->orientation + 4 * b));
-    const lw_vec3 velocity = lw_load3(motion->linear + 3 * b);
-    const lw_wind_sample air = lw_wind_at(&plates->wind, t, lw_load3(motion->position + 3 * b), velocity);
-    const lw_vec3 v = lw_mat_tvec(rotation, lw_sub(velocity, air.velocity));
-    const lw_vec3 omega = lw_mat_tvec(rotation, lw_load3(motion->angular + 3 * b));
-    const section_motion section = {v.x, v.y, sqrt(v.x * v.x + v.y * v.y), omega.z};
-    const planar_wrench planar = plates->coefficients == LW_PLATE_ANDERSEN
-                                     ? andersen(plates->density, chord, span, section)
-                                     : ristroph(plates->density, chord, span, section);
-    lw_vec3 f = lw_vec(planar.x, planar.y, 0.0), m = lw_vec(0.0, 0.0, planar.torque);
-    const lw_added_mass added = lw_plate_added_mass(plates->density, chord, span);
-    add_added_mass(added.normal, added.span, v, omega, lw_mat_tvec(rotation, air.rate).y, &f, &m);
-    f = lw_mat_vec(rotation, f);
-    m = lw_mat_vec(rotation, m);
+    plate_motion plate = {lw_load3(motion->position + 3 * b), lw_load3(motion->linear + 3 * b),
+                          lw_load3(motion->angular + 3 * b),
+                          lw_quat_matrix(lw_load4(motion->orientation + 4 * b)), {0.0, 0.0, 0.0}};
+    plate.omega = lw_mat_tvec(plate.rotation, plate.angular);
+    lw_vec3 f = {0.0, 0.0, 0.0}, m = {0.0, 0.0, 0.0};
+    for (int k = 0; k < n; ++k) { /* from -z to z */
+        lw_vec3 strip_f, strip_m;
+        const double z = span * (2 * k + 1 - n) / (2 * n);
+        strip_wrench(plates, t, &plate, chord, span / n, z, &strip_f, &strip_m);
+        f = k ? lw_add(f, strip_f) : strip_f;
+        m = k ? lw_add(m, strip_m) : strip_m;
+    }
+    f = lw_mat_vec(plate.rotation, f);
+    m = lw_mat_vec(plate.rotation, m);
     lw_store3(force, f);
     lw_store3(torque, m);
     return isfinite(f.x + f.y + f.z + m.x + m.y + m.z);
 }
 
-lw_added_mass lw_plate_added_mass(double density, double chord, double span) {
-    const double a2 = 0.25 * chord * chord, mass = pi * density * a2 * span;
-    const lw_added_mass added = {mass, mass * a2 / 8.0};
+lw_added_mass lw_plate_added_mass(double density, double chord, double span, int strips) {
+    const double a2 = 0.25 * chord * chord, mass = pi * density * a2 * span, n = strips;
+    const lw_added_mass added = {mass, mass * (span * span * (1.0 - 1.0 / (n * n)) / 12.0), mass * a2 / 8.0};
     return added;
 }
 
@@ -112,11 +166,12 @@ int lw_plates_evaluate(const lw_plates *plates, double t, const lw_motion *motio
             status = 1 + i;
         }
         if (wrench->added_inertia) {
-            const lw_added_mass added =
-                lw_plate_added_mass(plates->density, plates->size[2 * i], plates->size[2 * i + 1]);
+            const lw_added_mass added = lw_plate_added_mass(plates->density, plates->size[2 * i],
+                                                            plates->size[2 * i + 1], plates->strips);
             lw_unaligned *a = wrench->added_inertia + 36 * i;
             memset(a, 0, 36 * sizeof *a);
             a[1 * 6 + 1] = added.normal;
+            a[3 * 6 + 3] = added.chord;
             a[5 * 6 + 5] = added.span;
         }
     }

@@ -1,7 +1,8 @@
 /* Quasi-steady forces on thin flat plates; the equations are in fmu/README.md, "Force models".
  *
  * A plate's chord lies along body x, its span along body z, its normal along body y, its centre at the
- * centre of mass.
+ * centre of mass. Its span is cut into equal strips, each of which meets the air with the velocity of its own
+ * centre.
  */
 #ifndef LW_PLATE_H
 #define LW_PLATE_H
@@ -11,22 +12,26 @@
 #include "lw_forces.h"
 #include "lw_wind.h"
 
-enum { LW_PLATE_RISTROPH = 0, LW_PLATE_ANDERSEN = 1 };
+enum { LW_PLATE_RISTROPH = 0, LW_PLATE_ANDERSEN = 1, LW_PLATE_TABLE = 2 };
 
 typedef struct {
-    int n;               /* plates */
-    int coefficients;    /* LW_PLATE_RISTROPH or LW_PLATE_ANDERSEN */
-    const int32_t *body; /* (n) the plate's index among all bodies */
-    const double *size;  /* (n, 2) chord and span [m] */
-    double density;      /* of the fluid [kg/m^3] */
+    int n;                /* plates */
+    int coefficients;     /* LW_PLATE_... */
+    int strips;           /* of each plate, 1 or more */
+    int curve_size;       /* numbers in each of the curves; 0 without a table */
+    const int32_t *body;  /* (n) the plate's index among all bodies */
+    const double *size;   /* (n, 2) chord and span [m] */
+    const double *curves; /* (3, curve_size) of a table: lift, drag and moment about the middle of the chord,
+                             nose up, over the angle of attack -pi ... pi [rad], as lw_curve reads them */
+    double density;       /* of the fluid [kg/m^3] */
     lw_wind wind;
 } lw_plates;
 
-/* Added mass along the normal, pi rho (c/2)^2 s [kg], and added inertia about the span axis,
- * pi rho (c/2)^4 s / 8 [kg m^2]. */
-typedef struct { double normal, span; } lw_added_mass;
+/* Added mass along the normal, m = pi rho (c/2)^2 s [kg], and added inertia about the chord, that of m in the
+ * centres of the strips, m s^2 (1 - 1/n^2) / 12, and about the span, m (c/2)^2 / 8 [kg m^2]. */
+typedef struct { double normal, chord, span; } lw_added_mass;
 
-LW_API lw_added_mass lw_plate_added_mass(double density, double chord, double span);
+LW_API lw_added_mass lw_plate_added_mass(double density, double chord, double span, int strips);
 
 /* Write the wrench on every plate, without the part that is proportional to its acceleration, and that
  * part as added inertia (constant). Returns 0, or 1 + the index of the first plate whose wrench is not

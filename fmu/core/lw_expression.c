@@ -54,8 +54,7 @@ static int is_unary(int32_t operation) {
     return operation == LW_NEGATE || (operation >= LW_SIN && operation <= LW_ABS);
 }
 
-/* The curve at x with its derivatives. */
-static lw_jet curve(const double *table, double x) {
+lw_jet lw_curve(const double *table, double x) {
     int low = 0, high = (int)table[0];
     const double *place = table + 2, *coefficients = place + high + 1, first = place[0], last = place[high];
     if (table[1] > 0.0) x -= table[1] * floor((x - first) / table[1]);
@@ -86,7 +85,7 @@ void lw_expression_run(const int32_t *code, const int32_t *end, const double *co
         case LW_DEFINE: local[operand] = *--top; break;
         case LW_RESULT: results[operand] = *--top; break;
         case LW_POWER_INTEGER: top[-1] = power_integer(top[-1], operand); break;
-        case LW_TABLE: top[-1] = curve(constants + operand, top[-1]).value; break;
+        case LW_TABLE: top[-1] = lw_curve(constants + operand, top[-1]).value; break;
         default:
             if (is_unary(operation)) {
                 top[-1] = unary(operation, top[-1]);
@@ -187,7 +186,7 @@ void lw_expression_jet(const int32_t *code, const int32_t *end, const double *co
         case LW_RESULT: *result = *--top; break;
         case LW_POWER_INTEGER: top[-1] = integer_jet(top[-1], operand); break;
         case LW_TABLE:
-            c = curve(constants + operand, top[-1].value);
+            c = lw_curve(constants + operand, top[-1].value);
             top[-1] = chain(c.value, c.rate, c.change, top[-1]);
             break;
         default:

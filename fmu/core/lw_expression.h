@@ -21,12 +21,15 @@ enum { /* operations; the operand, where there is one, in brackets */
     LW_SIN, LW_COS, LW_TAN, LW_ASIN, LW_ACOS, LW_ATAN, LW_SINH, LW_COSH, LW_TANH,
     LW_EXP, LW_LOG, LW_SQRT, LW_ABS,
     LW_ATAN2, LW_HYPOT, LW_MIN, LW_MAX,
-    LW_TABLE /* a curve of cubic pieces, at constants + [operand]: number of pieces m, period or 0, the m + 1
-                places where they begin and end, 4 coefficients of each; held beyond its ends */
+    LW_TABLE /* the curve at constants + [operand] */
 };
 
 /* A value that depends on one variable, and its first two derivatives. */
 typedef struct { double value, rate, change; } lw_jet;
+
+/* A curve of cubic pieces at x: number of pieces m, period or 0, the m + 1 places where they begin and end,
+ * 4 coefficients of each; held beyond its ends. */
+lw_jet lw_curve(const double *table, double x);
 
 /* Run the program from `code` to `end`, pairs of operation and operand; results that it does not give stay. */
 void lw_expression_run(const int32_t *code, const int32_t *end, const double *constants,

@@ -91,7 +91,9 @@ extern const int32_t lw_fmu_inputs, lw_fmu_force_input[];
 /* ---- aero ---- */
 enum { LW_AERO_PLATE, LW_AERO_FIELD };
 extern const int32_t lw_fmu_aero_model;
-extern const int32_t lw_fmu_coefficients; /* LW_PLATE_RISTROPH or LW_PLATE_ANDERSEN */
+extern const int32_t lw_fmu_coefficients; /* LW_PLATE_... */
+extern const int32_t lw_fmu_strips, lw_fmu_curve_size;
+extern const double lw_fmu_curves[];      /* (3, curve_size) as lw_plate.h */
 extern const int32_t lw_fmu_gust_count;
 extern const double lw_fmu_gusts[];       /* (gust_count, 9) as lw_wind.h */
 extern const int32_t lw_fmu_field_start[]; /* (n + 1) as lw_field.h; the bodies are 0 ... n - 1 */

@@ -61,6 +61,9 @@ void lw_part_create(lw_instance *instance) {
     part->field.code = lw_fmu_field_code;
     part->field.constants = lw_fmu_field_constants;
     part->plates.coefficients = lw_fmu_coefficients;
+    part->plates.strips = lw_fmu_strips;
+    part->plates.curve_size = lw_fmu_curve_size;
+    part->plates.curves = lw_fmu_curves;
     part->plates.size = part->size;
     part->plates.wind.n_gusts = lw_fmu_gust_count;
     part->plates.wind.gusts = lw_fmu_gusts;

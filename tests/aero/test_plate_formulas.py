@@ -9,7 +9,7 @@ from linkwind.spatial import Motion, Wrench
 RNG = np.random.default_rng(21)
 DENSITY, CHORD, SPAN = 1.3, 0.4, 0.7
 CALM = WindTable(np.zeros(3), np.zeros((0, 9)))
-SETS = list(Coefficients)
+SETS = [Coefficients.RISTROPH, Coefficients.ANDERSEN]
 
 
 def ristroph(u, w, omega):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import zipfile
 
 import pytest
 from typer.testing import CliRunner
@@ -62,6 +63,23 @@ def test_a_program_puts_it_in_place(tmp_path, native):
     outcome = linkwind.run(scenario, tmp_path / "run", models={"aero": str(files["3"])}, report=False)
     assert outcome.result.final_state_sha256 == expected
     assert linkwind.verify(outcome.log, models={"aero": files["3"]}).identical
+
+
+def test_strips_and_their_table_as_fmu_give_the_native_trajectory(tmp_path):
+    """In space, where strips differ: the numbers of the table go with the FMU."""
+    rows = "[[0,0,0.05,0],[10,0.8,0.1,0],[45,1,1,-0.25],[90,0,1.9,-0.475]]"
+    settings = ["aero.plate.strips=8", "aero.plate.coefficients=table", f"aero.plate.table={rows}"]
+    overrides = ["time.end=0.1", "bus.transport=inprocess"]
+    scenario = load("flapper", [*overrides, *settings])
+    expected = fly(scenario, tmp_path / "native").result.final_state_sha256
+    assert fly(load("flapper", overrides), tmp_path / "without").result.final_state_sha256 != expected
+    file = export(scenario, tmp_path / "wings.fmu", fmi="3", part="aero").file
+    with zipfile.ZipFile(file) as archive:
+        page = archive.read("documentation/index.html").decode()
+    assert "8 equal strips" in page
+    assert "<td>45.0</td><td>1.0</td><td>1.0</td><td>-0.25</td>" in page
+    scenario, named, _ = load_with("flapper", overrides, [str(file)])
+    assert fly(scenario, tmp_path / "fmu", named).result.final_state_sha256 == expected
 
 
 def test_a_stiff_drag_flies_with_the_derivatives_of_the_fmu(tmp_path):

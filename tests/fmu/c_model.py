@@ -189,17 +189,20 @@ def aero(table: PlateTable | FieldTable, theta=(), *, scalar=False) -> Model:
         "ADDED_INERTIA": 36 * n,
     }
     start = {"ORIENTATION": np.tile([1.0, 0.0, 0.0, 0.0], n)}
-    gusts, field, coefficients = np.zeros((0, 9)), [[0], [0], [0.0]], 0
+    gusts, field, coefficients, strips, curves = np.zeros((0, 9)), [[0], [0], [0.0]], 0, 0, np.zeros((3, 0))
     if plate:
         start |= {"DENSITY": table.density, "WIND": table.wind.uniform}
         start |= {"LENGTH": table.size[:, 0], "SPAN": table.size[:, 1]}
         gusts, coefficients = table.wind.gusts, int(table.coefficients)
+        strips, curves = table.strips, table.curves
     else:
         field = [table.start, table.code, table.constants]
     constants = f"const int32_t lw_fmu_n = {n}, lw_fmu_nq = 0, lw_fmu_nv = 0;\n"
     constants += (
         f"const int32_t lw_fmu_aero_model = {int(not plate)}, lw_fmu_coefficients = {coefficients};\n"
     )
+    constants += f"const int32_t lw_fmu_strips = {strips}, lw_fmu_curve_size = {curves.shape[1]};\n"
+    constants += _array("double", "curves", curves)
     constants += f"const int32_t lw_fmu_gust_count = {len(gusts)};\n" + _array("double", "gusts", gusts)
     constants += _array("int32_t", "field_start", field[0]) + _array("int32_t", "field_code", field[1])
     constants += _array("double", "field_constants", field[2])

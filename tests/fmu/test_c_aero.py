@@ -55,18 +55,20 @@ def set_motion(fmu: Instance, motion: Motion) -> None:
         fmu.set(name, getattr(motion, name.lower()))
 
 
-@pytest.fixture(scope="module")
-def plate(compiler):
-    scenario = load(
-        "two_link",
-        [
-            "environment.gusts=[{amplitude=[0.5,0.2,0],frequency=2,wavenumber=[0.3,0,0]},"
-            "{shape='one_minus_cosine',amplitude=[0.5,0.2,0],frequency=2,wavenumber=[0.3,0,0],phase_deg=90}]"
-        ],
-    )
+GUSTS = (
+    "environment.gusts=[{amplitude=[0.5,0.2,0],frequency=2,wavenumber=[0.3,0,0.2]},"
+    "{shape='one_minus_cosine',amplitude=[0.5,0.2,0],frequency=2,wavenumber=[0.3,0,0],phase_deg=90}]"
+)
+TABLE = "[[0,0,0.05,0],[10,0.8,0.1,0],[45,1,1,-0.25],[90,0,1.9,-0.475]]"
+STRIPS = ["aero.plate.strips=3", "aero.plate.coefficients=table", f"aero.plate.table={TABLE}"]
+
+
+@pytest.fixture(scope="module", params=[[], STRIPS], ids=["plate", "strips"])
+def plate(compiler, request):
+    scenario = load("two_link", [GUSTS, *request.param])
     table = plate_table(scenario, scenario.providers[0])
     model = aero(table)
-    return table, model, compiler.library(model, 3, "plate")
+    return table, model, compiler.library(model, 3, f"plate{table.strips}")
 
 
 @pytest.fixture(scope="module")

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from linkwind.aero.base import Capabilities, body_indices
+from linkwind.aero.section import curves
 from linkwind.aero.wind import wind_table
 from linkwind.errors import ProtocolError, ScenarioError, SimulationError
 from linkwind.native.forces import Coefficients, Plates, PlateTable
@@ -32,21 +33,25 @@ def plate_table(scenario: Scenario, provider: Provider) -> PlateTable:
                 f'for aero model "plate"; got {got}. Add shape = {{ type = "plate", length = … }}.'
             )
         size.append((shape.length, shape.span))
+    plate = provider.plate
+    tabulated = plate.table if plate.coefficients == "table" else None
     return PlateTable(
         body=np.array(indices, dtype=np.int32),
         size=np.array(size),
-        coefficients=Coefficients[provider.plate.coefficients.upper()],
+        coefficients=Coefficients[plate.coefficients.upper()],
         density=scenario.environment.density,
         wind=wind_table(scenario.environment),
+        strips=plate.strips,
+        curves=np.zeros((3, 0)) if tabulated is None else curves(tabulated),
     )
 
 
 class Plate:
-    """Quasi-steady forces on flat plates.
+    """Quasi-steady forces on the strips of flat plates: blade elements.
 
     The wrench holds circulatory lift, drag, rotational terms and the velocity part of the added mass; the
-    acceleration part is returned as added inertia: π ρ (c/2)² s along the normal and π ρ (c/2)⁴ s / 8 about
-    the span axis, for a plate of chord c and span s.
+    acceleration part is returned as added inertia: m = π ρ (c/2)² s along the normal, m (c/2)² / 8 about the
+    span and m s² (1 - 1/N²) / 12 about the chord, for a plate of chord c and span s in N strips.
 
     Sources: H. Li, T. Goodwill, Z. J. Wang, L. Ristroph, J. Fluid Mech. 937, A6 (2022),
     doi:10.1017/jfm.2022.89 (``ristroph``); A. Andersen, U. Pesavento, Z. J. Wang, J. Fluid Mech. 541, 65

@@ -6,6 +6,7 @@ from html import escape
 
 from linkwind.fmi.part import Part
 from linkwind.fmi.variables import Variable
+from linkwind.scenario import Provider
 
 _STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }
@@ -53,21 +54,16 @@ of them
 are what the expressions of actuators and forces at points use by name; nobody has to set them.</p>
 """
 
-_PLATE = """
-<h2>Equations</h2>
-<p>Each body is a thin flat plate of chord c (along x of its body frame), span s (along z) and normal
-along y, in a
-quasi-steady flow. With the velocity of the air relative to the plate, U = √(u² + w²), lift and drag
-follow from the
-angle of attack α, blended from attached to stalled flow at 14°; rotation adds lift and a moment; the
-added mass
-π ρ (c/2)² s along the normal and the added inertia π ρ (c/2)⁴ s/8 about the span act on the acceleration
-and are
-returned as the matrix A.</p>
-<p>Sources: H. Li, T. Goodwill, Z. J. Wang, L. Ristroph, J. Fluid Mech. 937, A6 (2022),
-doi:10.1017/jfm.2022.89;
-A. Andersen, U. Pesavento, Z. J. Wang, J. Fluid Mech. 541, 65 (2005), doi:10.1017/S002211200500594X.</p>
-"""
+_SETS = {
+    "ristroph": "Lift and drag follow from the angle of attack, blended from attached to stalled flow at 14°; "
+    "they act at a centre of pressure that moves. Rotation adds lift and a moment. Source: H. Li, T. Goodwill, "
+    "Z. J. Wang, L. Ristroph, J. Fluid Mech. 937, A6 (2022), doi:10.1017/jfm.2022.89.",
+    "andersen": "A circulation with a translational and a rotational part gives the lift; drag is quadratic, "
+    "and a torque is against the rotation. Source: A. Andersen, U. Pesavento, Z. J. Wang, J. Fluid Mech. "
+    "541, 65 (2005), doi:10.1017/S002211200500594X.",
+    "table": "Lift, drag and moment about the quarter chord, nose up, are those of this table over the angle "
+    "of attack, with monotone cubics between its rows.",
+}
 
 
 def index(part: Part, picture: str, *, has_references: bool) -> bytes:
@@ -82,7 +78,9 @@ def index(part: Part, picture: str, *, has_references: bool) -> bytes:
     provider = part.provider
     link = '<a href="fmi-ls-ref.html">Reference results</a> come with this FMU.'
     checked = link if has_references else ""
-    equations = _DYNAMICS if provider is None else _PLATE if provider.model == "plate" else _field(part)
+    equations = (
+        _DYNAMICS if provider is None else _plate(provider) if provider.model == "plate" else _field(part)
+    )
     text = f"""<!DOCTYPE html>
 <html lang="en"><head><meta
 charset="utf-8"><title>{escape(part.identifier)}</title><style>{_STYLE}</style></head>
@@ -124,6 +122,22 @@ integrator.</p>
 </body></html>
 """
     return text.encode()
+
+
+def _plate(provider: Provider) -> str:
+    """How plates meet the air, with the numbers of a table."""
+    plate = provider.plate
+    rows = [["α, deg", "C<sub>l</sub>", "C<sub>d</sub>", "C<sub>m</sub>"], *(plate.table or ())]
+    cells = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
+    table = f"<table>{cells}</table>" if plate.coefficients == "table" else ""
+    count = "one strip" if plate.strips == 1 else f"{plate.strips} equal strips"
+    return (
+        "<h2>Equations</h2><p>Each body is a thin flat plate of chord c (along x of its body frame), span s "
+        f"(along z) and normal along y, in a quasi-steady flow. Its span is {count}; each meets the air with "
+        f"the velocity of its own centre. {_SETS[plate.coefficients]}</p>{table}<p>With n strips, the "
+        "added mass m = π ρ (c/2)² s along the normal and the added inertia m (c/2)²/8 about the span and "
+        "m s² (1 − 1/n²)/12 about the chord act on the acceleration and are returned as the matrix A.</p>"
+    )
 
 
 def _field(part: Part) -> str:

@@ -176,9 +176,18 @@ def provider_part(scenario: Scenario, provider: Provider, *, native_arrays: bool
 
 
 def _plate_constants(scenario: Scenario, provider: Provider) -> dict[str, Table]:
-    coefficients = int(plate_table(scenario, provider).coefficients) if provider.model == "plate" else 0
     gusts = wind_table(scenario.environment).gusts
-    return {"coefficients": coefficients, "gust_count": len(gusts), "gusts": gusts}
+    wind: dict[str, Table] = {"gust_count": len(gusts), "gusts": gusts}
+    if provider.model != "plate":
+        return {"coefficients": 0, "strips": 0, "curve_size": 0, "curves": np.zeros(0), **wind}
+    plates = plate_table(scenario, provider)
+    return {
+        "coefficients": int(plates.coefficients),
+        "strips": plates.strips,
+        "curve_size": plates.curves.shape[1],
+        "curves": plates.curves,
+        **wind,
+    }
 
 
 def _field_constants(scenario: Scenario, provider: Provider) -> dict[str, Table]:

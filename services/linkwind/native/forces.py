@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import enum
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,7 @@ class Coefficients(enum.IntEnum):
 
     RISTROPH = 0
     ANDERSEN = 1
+    TABLE = 2
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,9 @@ class PlateTable:
         coefficients: the coefficient set of all plates.
         density: of the fluid [kg/m³].
         wind: the wind that all plates are in.
+        strips: that the span of each plate is cut into.
+        curves: of TABLE: C_l, C_d and C_m about the middle of the chord, nose up, over the angle of attack
+            -π … π, each as ``expression.curves`` lays it out, shape (3, any).
     """
 
     body: Indices
@@ -64,6 +68,8 @@ class PlateTable:
     coefficients: Coefficients
     density: float
     wind: WindTable
+    strips: int = 1
+    curves: Array = field(default_factory=lambda: np.zeros((3, 0)))
 
 
 @dataclass(frozen=True)
@@ -107,8 +113,11 @@ class _Plates(ctypes.Structure):
     _fields_ = [
         ("n", ctypes.c_int),
         ("coefficients", ctypes.c_int),
+        ("strips", ctypes.c_int),
+        ("curve_size", ctypes.c_int),
         ("body", ctypes.c_void_p),
         ("size", ctypes.c_void_p),
+        ("curves", ctypes.c_void_p),
         ("density", ctypes.c_double),
         ("wind", _Wind),
     ]
@@ -199,8 +208,11 @@ class Plates:
         self._struct = _Plates(
             len(table.body),
             table.coefficients,
+            table.strips,
+            table.curves.shape[1],
             _index_address(self._body),
             address(table.size),
+            address(table.curves) if table.curves.size else None,
             table.density,
             _wind_struct(table.wind),
         )

@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 from pydantic import ValidationError
 
 from linkwind.errors import ScenarioError
-from linkwind.scenario import translation
+from linkwind.scenario import polars, translation
 from linkwind.scenario.agreement import disagreements
 from linkwind.scenario.model import Scenario
 from linkwind.scenario.overrides import override
@@ -85,7 +85,7 @@ def loads(text: str, name: str, overrides: Sequence[str] = ()) -> Scenario:
         raise ScenarioError(
             f"{name}: expected valid TOML; got: {_flat(error)}{_quoted(error, text)}. {_advice(error)}"
         ) from None
-    scenario = _scenario(data, name, overrides)
+    scenario = _scenario(data, name, overrides, Path(name).parent)
     scenario.called(name)
     return scenario
 
@@ -102,7 +102,7 @@ def from_json(text: str, name: str = "scenario.json", overrides: Sequence[str] =
         raise ScenarioError(f"{name}: expected valid JSON; got: {_flat(error)}. Correct it.") from None
     if not isinstance(data, dict):
         raise ScenarioError(f"{name}: expected an object; got {type(data).__name__}. Correct it.")
-    return _scenario(data, name, overrides)
+    return _scenario(data, name, overrides, None)
 
 
 def template() -> str:
@@ -127,16 +127,19 @@ def _advice(error: Exception) -> str:
     return "Correct it."
 
 
-def _scenario(data: dict[str, Any], name: str, overrides: Sequence[str]) -> Scenario:
+def _scenario(data: dict[str, Any], name: str, overrides: Sequence[str], folder: Path | None) -> Scenario:
+    """Return the scenario of plain data; names of files in it start in ``folder``, in overrides here."""
     source = Source(name, shorthand=False, overridden={}, data=data)
     try:
         data, shorthand = expand(copy.deepcopy(data), Path(name).stem)
         source = Source(name, shorthand, {}, data)
+        polars.read(data, folder)
         for argument in overrides:
             try:
                 source.overridden[override(data, argument)] = argument
             except ProblemError as error:
                 _refuse(error.problems, replace(source, file=f"--set {argument}", overridden={}))
+        polars.read(data, Path())
     except ProblemError as error:
         _refuse(error.problems, source)
     tables: dict[str, Any] = {}

@@ -5,14 +5,15 @@ from __future__ import annotations
 import re
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema
+from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
 
-from linkwind.scenario.problems import ProblemError
+from linkwind.scenario.polars import COLUMNS, Rows
+from linkwind.scenario.problems import Problem, ProblemError
 from linkwind.scenario.quantities import Name, Section, Vector, quantity
 
 AeroModel = Literal["none", "field", "plate", "flow", "fmu", "python"]
 ADDING_INERTIA: tuple[AeroModel, ...] = ("plate", "flow", "fmu", "python")  # that may move massless bodies
-PlateCoefficients = Literal["ristroph", "andersen"]
+PlateCoefficients = Literal["ristroph", "andersen", "table"]
 
 
 def _let(value: Any) -> dict[str, Any]:
@@ -68,8 +69,31 @@ class PlateModel(Section):
 
     coefficients: PlateCoefficients = Field(
         default="ristroph",
-        description="Coefficients: ristroph (Li et al. 2022), andersen (Andersen, Pesavento & Wang 2005)",
+        description="Coefficients: ristroph (Li et al. 2022), andersen (Andersen, Pesavento & Wang 2005), or "
+        "those of table",
     )
+    table: Rows | None = quantity(
+        "Rows [alpha_deg, cl, cd, cm] over the angle of attack, or a CSV file of these columns: -180 to 180, "
+        "or 0 to 180 or 90 for a section with one or two symmetries; cm about the quarter chord, nose up",
+        "deg, 1, 1, 1",
+        None,
+    )
+    strips: int = Field(
+        default=1,
+        ge=1,
+        le=1000,
+        description="Equal strips of the span; each meets the air with the velocity of its own centre",
+    )
+
+    @model_validator(mode="after")
+    def _of_the_table(self) -> PlateModel:
+        if self.coefficients == "table" and self.table is None:
+            expected = f"rows [{', '.join(COLUMNS)}], or a CSV file with these columns"
+            raise ProblemError([Problem(("table",), expected, "nothing", "Add table.")])
+        if self.table is not None and "coefficients" not in self.model_fields_set:
+            advice = 'Add coefficients = "table".'
+            raise ProblemError([Problem(("coefficients",), '"table", or another set', "nothing", advice)])
+        return self
 
 
 class FlowModel(Section):
