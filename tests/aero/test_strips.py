@@ -7,7 +7,7 @@ import linkwind
 from linkwind.aero.section import curves
 from linkwind.native.forces import Coefficients, Plates, PlateTable, WindTable
 from linkwind.spatial import Motion, Wrench
-from tests.aero.test_plate_formulas import random_state, random_wind, rotation_matrix, state
+from tests.aero.test_plate_formulas import rotation_matrix, state
 
 RNG = np.random.default_rng(31)
 DENSITY, CHORD, SPAN = 1.3, 0.4, 0.7
@@ -20,6 +20,18 @@ TABLES = {
     "andersen": (Coefficients.ANDERSEN, None),
     "table": (Coefficients.TABLE, ROWS),
 }
+
+
+def random_state():
+    q = RNG.normal(size=4)
+    scale = 10.0 ** RNG.uniform(-3, 2, size=2)
+    linear, angular = scale[:, None] * RNG.normal(size=(2, 3))
+    return state(RNG.normal(size=3), q / np.linalg.norm(q), linear, angular)
+
+
+def random_wind():
+    """A wave and a single gust."""
+    return WindTable(RNG.normal(size=3), np.column_stack([RNG.normal(size=(2, 8)), [0.0, 1.0]]))
 
 
 def plate(strips, rows=ROWS, coefficients=Coefficients.TABLE, wind=CALM, size=((CHORD, SPAN),)):

@@ -55,9 +55,9 @@ are what the expressions of actuators and forces at points use by name; nobody h
 """
 
 _SETS = {
-    "ristroph": "Lift and drag follow from the angle of attack, blended from attached to stalled flow at 14°; "
-    "they act at a centre of pressure that moves. Rotation adds lift and a moment. Source: H. Li, T. Goodwill, "
-    "Z. J. Wang, L. Ristroph, J. Fluid Mech. 937, A6 (2022), doi:10.1017/jfm.2022.89.",
+    "ristroph": "Lift and drag follow from the angle of attack, blended from attached to stalled flow at "
+    "14°, and act at a centre of pressure that moves; rotation adds lift and a moment. Source: H. Li, "
+    "T. Goodwill, Z. J. Wang, L. Ristroph, J. Fluid Mech. 937, A6 (2022), doi:10.1017/jfm.2022.89.",
     "andersen": "A circulation with a translational and a rotational part gives the lift; drag is quadratic, "
     "and a torque is against the rotation. Source: A. Andersen, U. Pesavento, Z. J. Wang, J. Fluid Mech. "
     "541, 65 (2005), doi:10.1017/S002211200500594X.",
