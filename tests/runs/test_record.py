@@ -23,6 +23,7 @@ from typer.testing import CliRunner
 
 from linkwind.aero.service import serve, session
 from linkwind.bus.zenoh import ZenohListener, ZenohProviderLink, loopback_endpoint, open_session
+from linkwind.bus.zenoh import session as session_settings
 from linkwind.cli import app
 from linkwind.errors import InputError, LinkwindError, LostError
 from linkwind.listening import described
@@ -104,6 +105,12 @@ def no_signals(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(f"linkwind.runs.{module}.stops_as_interrupt", nothing)
 
 
+@pytest.fixture
+def long_lease(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both sides of a run are in this process, which a loaded machine may give no time for a second."""
+    monkeypatch.setattr(session_settings, "LEASE", 10.0)
+
+
 def heard_from_the_start(folder: Path, *settings: str, name: str = "two_link") -> tuple[Log, Recording]:
     """Run with a recorder that listens before the provider is there."""
     endpoint, there = loopback_endpoint(), threading.Event()
@@ -143,6 +150,7 @@ def test_a_log_from_the_start_is_the_run_s_own(name: str, settings: tuple[str, .
         assert {topic.rsplit("/", 1)[0] for topic in heard.topics} >= {"/flow", "/checkpoint", "/wrench"}
 
 
+@pytest.mark.usefixtures("long_lease")
 def test_who_comes_late_says_what_is_missing(tmp_path: Path) -> None:
     """The recorder starts when half of the messages have passed; until it is there, nothing more happens."""
     endpoint, folder = loopback_endpoint(), tmp_path / "heard"
@@ -232,6 +240,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> str:
     return digest
 
 
+@pytest.mark.usefixtures("long_lease")
 @pytest.mark.parametrize("what", ["killed", "stopped for a while", "told to end"])
 def test_the_run_is_not_disturbed(what: str, undisturbed: str, tmp_path: Path) -> None:
     """The run is held in its middle until that has happened to the recorder."""
