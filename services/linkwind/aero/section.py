@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -24,8 +25,9 @@ def curves(rows: Sequence[Sequence[float]]) -> Array:
         Each as ``expression.curves`` lays it out, shape (3, any).
     """
     alpha, lift, drag, moment = np.array(rows, dtype=np.float64).T
-    turned = np.radians(alpha)
-    moment = moment + 0.25 * (lift * np.cos(turned) + drag * np.sin(turned))
+    # By the C library: numpy's sines differ between processors in the last bit.
+    sine, cosine = np.array([(math.sin(turned), math.cos(turned)) for turned in np.radians(alpha)]).T
+    moment = moment + 0.25 * (lift * cosine + drag * sine)
     if alpha[0] == 0.0:
         moment[[0, -1]] = 0.0  # so far but for round-off
     else:
@@ -36,8 +38,8 @@ def curves(rows: Sequence[Sequence[float]]) -> Array:
     if alpha[0] == 0.0:
         points = np.hstack([_mirrored(points[:, 1:], 0.0), points])
     place = np.radians(points[0]).tolist()
-    each = [tuple(zip(place, value.tolist(), strict=True)) for value in points[1:]]
-    return np.array([Curve(points, smooth=True, periodic=True).layout() for points in each])
+    each = [tuple(zip(place, values.tolist(), strict=True)) for values in points[1:]]
+    return np.array([Curve(through, smooth=True, periodic=True).layout() for through in each])
 
 
 def _mirrored(points: Array, about: float) -> Array:
