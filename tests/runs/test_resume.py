@@ -22,6 +22,7 @@ from linkwind.runs.verify import scenario_of, verify
 from linkwind.scenario import load
 from linkwind.spatial import Motion, Wrench
 from tests.flows import VortexModel
+from tests.fmi.scenes import SERVO
 from tests.runs.edit import rewrite
 
 STEPS, EVERY = 60, 10
@@ -261,6 +262,17 @@ def test_a_branch_differs_behind_its_step_only(
     assert [m for m in branch if m[1] <= 25_000_000] == before
     verified = verify(*scenario_of(done.outcome.log))
     assert (verified.difference, verified.steps) == (None, STEPS)
+
+
+def test_inputs_of_actuators_may_change(tmp_path: Path) -> None:
+    arm = tmp_path / "servo.toml"
+    arm.write_text(SERVO)
+    whole = fly(str(arm), tmp_path / "whole")
+    done = go_on(whole.log, tmp_path / "branch", 25, ["forces.motor.inputs.u=3.0"])
+    found = diff(whole.log, done.outcome.log)
+    assert found.first is not None
+    assert found.first.step == 26
+    assert verify(*scenario_of(done.outcome.log)).identical
 
 
 def test_a_branch_is_resumed_and_branched_again(tmp_path: Path) -> None:
