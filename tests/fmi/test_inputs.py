@@ -346,3 +346,9 @@ def test_info_shows_inputs_and_commands(fmu):
     assert "Lets drop happen when it becomes true" in rows["drop.command"]
     assert "input" in rows["motor.u"]
     assert "0.4" in rows["spring.target"]
+
+
+def test_documentation_shows_the_laws_that_use_them(unpacked):
+    page = (unpacked("servo", "dynamics", "2", "native") / "documentation" / "index.html").read_text()
+    for text in ("gain*sin(target - q) - 0.1*v", "<td>motor</td><td>actuator</td>", "drop.command", "false"):
+        assert text in page

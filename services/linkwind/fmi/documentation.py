@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from html import escape
 
+from linkwind.fmi.coordinates import force_names
 from linkwind.fmi.part import Part
 from linkwind.fmi.variables import Variable
 from linkwind.scenario import Provider
+from linkwind.scenario.functions import Function
 
 _STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }
@@ -51,7 +53,11 @@ in Event Mode. It happens once; <code>….time</code> tells when, −1 that it h
 <h2>Force elements</h2>
 <p>Springs, actuators, prescribed motions, forces at points and buoyancy are part of the mechanism. Inputs
 of them
-are what the expressions of actuators and forces at points use by name; nobody has to set them.</p>
+are what the expressions of actuators and forces at points use by name; nobody has to set them. Expressions
+are of
+time t; a spring's also of length and rate, an actuator's of the coordinate q and its rate v, that of a force
+at a point
+of x y z vx vy vz wx wy wz theta of the body.</p>
 """
 
 _SETS = {
@@ -79,7 +85,11 @@ def index(part: Part, picture: str, *, has_references: bool) -> bytes:
     link = '<a href="fmi-ls-ref.html">Reference results</a> come with this FMU.'
     checked = link if has_references else ""
     equations = (
-        _DYNAMICS if provider is None else _plate(provider) if provider.model == "plate" else _field(part)
+        _DYNAMICS + _forces(part)
+        if provider is None
+        else _plate(provider)
+        if provider.model == "plate"
+        else _field(part)
     )
     text = f"""<!DOCTYPE html>
 <html lang="en"><head><meta
@@ -162,6 +172,28 @@ def _field(part: Part) -> str:
     )
 
 
+def _forces(part: Part) -> str:
+    """The force elements, as the scenario states them."""
+    rows = []
+    for name, force in zip(force_names(part.mechanism), part.scenario.forces, strict=True):
+        stated = list(getattr(force, "let", {}).items())
+        laws = ("force", "position", "fx", "fy", "fz", "tx", "ty", "tz")
+        stated += [(key, _law(law)) for key in laws if (law := getattr(force, key, None)) is not None]
+        rows += [(name, force.type, key, text) for key, text in stated or [("", "")]]
+    if not rows:
+        return ""
+    cells = "".join(
+        f"<tr><td>{escape(name)}</td><td>{escape(kind)}</td><td>{escape(key)}</td>"
+        f"<td><code>{escape(text)}</code></td></tr>"
+        for name, kind, key, text in rows
+    )
+    return f"<table><tr><th>name</th><th>type</th><th></th><th>expression</th></tr>{cells}</table>"
+
+
+def _law(law: Function) -> str:
+    return law.expression if law.expression is not None else f"a table of {len(law.table or ())} points"
+
+
 def _table(title: str, part: Part, causality: str) -> str:
     rows = "".join(map(_row, (entry for entry in part.variables if entry.causality == causality)))
     if not rows:
@@ -173,6 +205,8 @@ def _table(title: str, part: Part, causality: str) -> str:
 def _row(variable: Variable) -> str:
     unit = variable.quantity.unit.name if variable.quantity.unit else ""
     start = ", ".join(f"{value:.6g}" for value in variable.start) if any(variable.start) else "0"
+    if variable.boolean:
+        start = "true" if any(variable.start) else "false"
     cells = (
         f"<code>{escape(variable.name)}</code>",
         " × ".join(map(str, variable.dimensions)),
