@@ -4,7 +4,8 @@ https://ssp-standard.org/publications/SSP10/SystemStructureAndParameterization10
 ``SystemStructure.ssd`` and the FMUs. The mechanism's FMU is the element ``dynamics``, a force model's is
 named like its provider; what has the same name on both sides is connected, as the terminals of FMI 3 are.
 Inputs of the mechanism that no force model gives are inputs of the system, with the values that they have in
-a run; all that the mechanism tells are its outputs.
+a run, and all that the mechanism tells are its outputs. Where there are none the system is closed: it has no
+connectors of its own, which some tools cannot read.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from __future__ import annotations
 import os
 import xml.etree.ElementTree as ET
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,6 +27,7 @@ from linkwind.fmi.variables import Variable
 from linkwind.scenario import Scenario
 
 DYNAMICS = "dynamics"
+Link = tuple[str | None, str, str | None, str]  # element (None: the system) and variable at start and end
 SSD, SSC, SSV = (
     f"http://ssp-standard.org/SSP1/SystemStructure{what}"
     for what in ("Description", "Common", "ParameterValues")
@@ -100,33 +102,40 @@ def structure(parts: dict[str, Part]) -> bytes:
     )  # fmt: skip
     about = f"Forces held over communication steps, of {mechanism.step!r} s in the scenario"
     system = _child(root, "System", name=identifier, description=about)
-    links = list(_links(parts))
-    given = {name for _, _, end, name in links if end == DYNAMICS}
-    inputs = [v for v in mechanism.variables if v.causality == "input"]
-    open_inputs = [v for v in inputs if v.name not in given]
-    outputs = [v for v in mechanism.variables if v.causality == "output"]
-    _connectors(system, [*open_inputs, *outputs])
-    _start_values(system, open_inputs)
+    inner = list(_inner(parts))
+    inputs = _open_inputs(mechanism, {name for _, _, end, name in inner if end == DYNAMICS})
+    outputs = [v for v in mechanism.variables if v.causality == "output"] if inputs else []
+    links = [
+        *inner,
+        *((None, v.name, DYNAMICS, v.name) for v in inputs),
+        *((DYNAMICS, v.name, None, v.name) for v in outputs),
+    ]
+    if inputs:
+        _connectors(system, [*inputs, *outputs])
+        _start_values(system, inputs)
+    targets = {(end, name) for _, _, end, name in links}
     elements = _child(system, "Elements")
     for name, part in parts.items():
         component = _child(
             elements, "Component", name=name, source=f"resources/{name}.fmu", implementation="CoSimulation"
         )
-        _connectors(component, [v for v in part.variables if v.causality in ("input", "output")])
-    connections = _child(system, "Connections")
-    for start, one, end, other in links:
-        _connect(connections, startElement=start, startConnector=one, endElement=end, endConnector=other)
-    for variable in open_inputs:
-        _connect(connections, startConnector=variable.name, endElement=DYNAMICS, endConnector=variable.name)
-    for variable in outputs:
-        _connect(connections, startElement=DYNAMICS, startConnector=variable.name, endConnector=variable.name)
+        given = [v for v in part.variables if v.causality == "output" or (name, v.name) in targets]
+        _connectors(component, given)
+    _connections(_child(system, "Connections"), links)
     _units(root, mechanism.variables)
     _child(root, "DefaultExperiment", startTime="0", stopTime=repr(mechanism.scenario.time.end))
     return to_bytes(root)
 
 
-def _links(parts: dict[str, Part]) -> Iterator[tuple[str, str, str, str]]:
-    """Yield element and variable at the start and the end of each connection: all motion, then all forces."""
+def _open_inputs(mechanism: Part, given: Collection[str]) -> list[Variable]:
+    """Return what somebody else gives; not the added inertia of bodies whose forces come without."""
+    found = [v for v in mechanism.variables if v.causality == "input" and v.name not in given]
+    forced = {name.partition(".")[0] for name in given}
+    return [v for v in found if v.section != "ADDED_INERTIA" or v.name.partition(".")[0] not in forced]
+
+
+def _inner(parts: dict[str, Part]) -> Iterator[Link]:
+    """Yield the connections between mechanism and force models: all motion, then all forces."""
     models = [(name, part) for name, part in parts.items() if name != DYNAMICS]
     for name, part in models:
         yield from ((DYNAMICS, v.name, name, v.name) for v in part.variables if v.causality == "input")
@@ -147,8 +156,6 @@ def _connectors(parent: ET.Element, variables: Iterable[Variable]) -> None:
 
 def _start_values(system: ET.Element, variables: list[Variable]) -> None:
     """What the inputs are that nothing outside of the system is connected to."""
-    if not variables:
-        return
     values = _child(_child(_child(system, "ParameterBindings"), "ParameterBinding"), "ParameterValues")
     group = ET.SubElement(values, f"{{{SSV}}}ParameterSet", version="1.0", name="start")
     group = ET.SubElement(group, f"{{{SSV}}}Parameters")
@@ -169,8 +176,10 @@ def _units(root: ET.Element, variables: Iterable[Variable]) -> None:
         ET.SubElement(unit, f"{{{SSC}}}BaseUnit", {base: str(power) for base, power in units[name].exponents})
 
 
-def _connect(group: ET.Element, **ends: str) -> None:
-    _child(group, "Connection", **ends)
+def _connections(group: ET.Element, links: Iterable[Link]) -> None:
+    for start, one, end, other in links:
+        ends = {"startElement": start, "startConnector": one, "endElement": end, "endConnector": other}
+        _child(group, "Connection", **{key: name for key, name in ends.items() if name is not None})
 
 
 def _child(parent: ET.Element, tag: str, **attributes: str) -> ET.Element:
