@@ -18,7 +18,7 @@ PATIENCE = 120.0  # s for a machine under load
 # Not by chance: these build an image, which takes minutes, and need Docker. tests/docker/run.sh has it all.
 REASON = "" if "LINKWIND_TEST_DOCKER" in os.environ else "builds an image: run tests/docker/run.sh"
 COMPOSE = os.environ.get("COMPOSE", "docker-compose")
-PROFILES = ("force-fmu", "observe", "replay", "view")
+PROFILES = ("force-fmu", "own-model", "observe", "replay", "view")
 NOBODY = 4321  # a user that neither this machine nor the image knows
 
 
@@ -37,7 +37,7 @@ class Project:
     def __init__(self, folder: Path, image: str, *more: str) -> None:
         self._files = [part for name in ("compose.yaml", *more) for part in ("-f", f"docker/{name}")]
         self.name = f"lw{uuid.uuid4().hex[:8]}"
-        self.folders = {name: folder / name for name in ("runs", "scenarios", "fmus")}
+        self.folders = {name: folder / name for name in ("runs", "scenarios", "fmus", "models")}
         for path in self.folders.values():
             path.mkdir(parents=True)
             for above in (path, *path.parents[:3]):  # pytest makes its folders for its own user alone

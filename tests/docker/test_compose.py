@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from linkwind.log.reader import open_log
@@ -15,6 +17,7 @@ from tests.docker.compose import (
     NOBODY,
     PATIENCE,
     REASON,
+    ROOT,
     Project,
     digest_outside,
     docker,
@@ -87,6 +90,25 @@ def test_fmu_takes_the_aero_side(project: Project, tmp_path: Path) -> None:
     outside = digest_outside(tmp_path / "outside", "two_link", "--set=time.end=0.2", f"--force-fmu={fmu}")
     assert log.final_state_sha256 == outside
     assert [provider["model"] for provider in json.loads(log.scenario_json)["providers"]] == ["fmu"]
+
+
+def test_a_model_in_python_takes_the_aero_side(project: Project, tmp_path: Path) -> None:
+    for name, folder in (("kite.py", "models"), ("kite.toml", "scenarios")):
+        shutil.copy(ROOT / "schemas/examples" / name, project.folders[folder] / name)
+    status, output = project.do(
+        "--profile", "own-model", "up", "--exit-code-from", "dynamics",
+        OWN="kite.py:Kite", SCENARIO="/scenarios/kite.toml", END="0.2",
+    )  # fmt: skip
+    assert status == 0, output
+    log = open_log(project.folder() / "log.mcap")
+    scenario, model = (project.folders["scenarios"] / "kite.toml", project.folders["models"] / "kite.py")
+    linkwind(
+        "run", str(scenario), "--set=time.end=0.2", f"--model={model}:Kite", "--out", str(tmp_path / "out")
+    )
+    outside = open_log(tmp_path / "out/log.mcap").trajectory()
+    # Not to the bit: the kite is numpy's arithmetic, whose libraries are not the same in the image.
+    np.testing.assert_allclose(log.trajectory().position, outside.position, rtol=0, atol=1e-9)
+    assert [provider["model"] for provider in json.loads(log.scenario_json)["providers"]] == ["python"]
 
 
 def test_aero_stays_for_the_next_run(project: Project) -> None:
