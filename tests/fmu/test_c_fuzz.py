@@ -69,7 +69,7 @@ def test_random_calls(sanitized, name):
     version = int(name[-1])
     program = sanitized.program(models()[name], version, f"fuzz_{name}", HERE / f"fuzz{version}.c")
     total: dict[str, list[int]] = {}
-    for seed in range(1, 4):
+    for seed in range(1, 6):
         for call, counts in run(program, version, seed).items():
             total[call] = [a + b for a, b in zip(total.get(call, [0] * 4), counts, strict=True)]
     for call, (ok, _, _, error) in total.items():  # every call has been right and wrong
