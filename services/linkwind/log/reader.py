@@ -84,7 +84,7 @@ class Log(Head):
     def of_topic(self, topic: str) -> Iterator[Message]:
         """Iterate like :meth:`messages` over one topic; several such side by side read the file only once."""
         channel = next((n for n, channel in self.channels.items() if channel.topic == topic), None)
-        for chunk in self._contents.chunks:
+        for chunk in self._contents.chunks if channel is not None else ():
             if chunk not in self._sorted:
                 if len(self._sorted) == CHUNKS_KEPT:
                     del self._sorted[next(iter(self._sorted))]
