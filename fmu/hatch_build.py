@@ -55,17 +55,19 @@ def run_compiler(*arguments: object, cwd: Path) -> None:
 def compile_library(root: Path, target: Path) -> None:
     """Compile the folders of ``fmu`` that the Python side calls into one shared library.
 
-    The lattice is for vectors, which gcc makes of plain loops at -O3 only.
+    Fluids are for vectors, which gcc makes of plain loops at -O3 only.
     """
     source = root / "fmu"
     folders = ("core", "baselines", "aero", "coupling")
-    includes = [f"-I{source / folder}" for folder in (*folders, "flow")]
+    fluids = ("flow", "vortex")
+    includes = [f"-I{source / folder}" for folder in (*folders, *fluids)]
     partial = target.with_name(target.name + ".partial")
     with tempfile.TemporaryDirectory() as folder:
         objects = Path(folder)
         exact = sorted(file for folder in folders for file in (source / folder).glob("*.c"))
         run_compiler(*includes, "-c", *exact, cwd=objects)
-        run_compiler(*includes, "-O3", "-c", *sorted((source / "flow").glob("*.c")), cwd=objects)
+        wide = sorted(file for folder in fluids for file in (source / folder).glob("*.c"))
+        run_compiler(*includes, "-O3", "-c", *wide, cwd=objects)
         run_compiler("-shared", "-o", partial, *sorted(objects.glob("*.o")), "-lm", cwd=objects)
     partial.replace(target)  # a running process keeps the file that it has mapped
 

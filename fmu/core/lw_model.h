@@ -3,6 +3,7 @@
 #define LW_MODEL_H
 
 #include "lw_expression.h"
+#include "lw_linear.h"
 #include "lw_multibody.h"
 
 typedef struct { lw_vec3 linear, angular; } lw_spatial; /* twist, acceleration, or (force, torque) */
@@ -199,10 +200,6 @@ int lw_accelerations(lw_multibody *multibody, const double *q, const double *v, 
                      double *joint_acceleration, lw_fault *fault);
 lw_spatial lw_total_wrench(const lw_link *link, const double *wrench);
 double lw_wrench_power(const lw_multibody *multibody, const double *wrench);
-/* lw_linear.c: a (m,m), row-major, as the factors L U of its rows exchanged: row k with row pivots[k]; solve
- * a x = b with them, x replaces b. */
-int lw_factor(int m, double *a, double *pivots);
-void lw_substitute(int m, const double *factors, const double *pivots, double *b);
 /* lw_inputs.c: index of the first number that is not finite, or -1; the inputs of a call */
 int lw_first_not_finite(const double *values, int count);
 int lw_inputs_check(const lw_multibody *multibody, const double *state, int32_t count,

@@ -1,6 +1,6 @@
 /* Asked of the processor itself: the compilers' own way pulls in, with zig, a runtime whose sin, cos and exp then
  * take the place of the C library's in the whole of this library, and differ in the last bit. */
-#include "lw_lattice.h"
+#include "lw_instructions.h"
 
 #if defined(__x86_64__) && defined(__GNUC__)
 #include <cpuid.h>

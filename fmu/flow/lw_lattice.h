@@ -11,6 +11,7 @@
 
 #include <stdint.h>
 
+#include "lw_instructions.h"
 #include "lw_threads.h"
 
 enum {
@@ -38,11 +39,6 @@ typedef struct {
     lw_threads *threads;            /* NULL: the caller alone, row after row */
     int32_t instructions;           /* lw_instructions of this processor; written by lw_lattice_init */
 } lw_lattice;
-
-typedef enum { LW_PLAIN, LW_AVX2, LW_AVX512 } lw_instructions;
-
-/* The widest set of instructions that processor and system have. */
-lw_instructions lw_instructions_here(void);
 
 /* Fill everything with the stream, and `blend` and `instructions`. */
 LW_API void lw_lattice_init(lw_lattice *lattice);

@@ -8,7 +8,8 @@ asserted: between the two lies chaos.
 import numpy as np
 import pytest
 
-from linkwind.native.forces import Coefficients, Plates, PlateTable, WindTable
+from linkwind.native.forces import Coefficients, Plates, PlateTable
+from linkwind.native.wind import WindTable
 from linkwind.spatial import Motion, Wrench
 
 GRAVITY = 1.0

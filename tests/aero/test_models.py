@@ -63,9 +63,9 @@ def test_save_and_restore_give_the_same_bits_again(force_model):
     assert force_model.save() == blob
 
 
-def test_capabilities_are_those_of_an_instantaneous_model_but_for_the_flow(force_model):
+def test_capabilities_are_those_of_an_instantaneous_model_but_for_a_fluid_that_remembers(force_model):
     can = force_model.capabilities
-    if isinstance(force_model, aero.MODELS["flow"]):
+    if isinstance(force_model, (aero.MODELS["flow"], aero.MODELS["vortex"])):
         assert (can.kind, can.rollback, can.response_size, can.own_step_ns) == ("mean", True, 36, 0)
         return
     assert (can.kind, can.rollback, can.response_size, can.own_step_ns) == ("point", True, 0, 0)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from linkwind.native.forces import Coefficients, Plates, PlateTable, WindTable, wind_at
+from linkwind.native.forces import Coefficients, Plates, PlateTable
+from linkwind.native.wind import WindTable, wind_at
 from linkwind.spatial import Motion, Wrench
 
 RNG = np.random.default_rng(21)

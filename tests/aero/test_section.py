@@ -5,7 +5,8 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 from linkwind.aero.section import curves
-from linkwind.native.forces import Coefficients, Plates, PlateTable, WindTable
+from linkwind.native.forces import Coefficients, Plates, PlateTable
+from linkwind.native.wind import WindTable
 from linkwind.spatial import Motion, Wrench
 from tests.aero.scenes import PLATE, model, wrench
 

@@ -5,7 +5,8 @@ import pytest
 
 import linkwind
 from linkwind.aero.section import curves
-from linkwind.native.forces import Coefficients, Plates, PlateTable, WindTable
+from linkwind.native.forces import Coefficients, Plates, PlateTable
+from linkwind.native.wind import WindTable
 from linkwind.spatial import Motion, Wrench
 from tests.aero.test_plate_formulas import rotation_matrix, state
 

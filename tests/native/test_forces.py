@@ -14,9 +14,8 @@ from linkwind.native.forces import (
     FieldTable,
     Plates,
     PlateTable,
-    WindTable,
-    wind_at,
 )
+from linkwind.native.wind import WindTable, wind_at
 from linkwind.spatial import Motion, Wrench
 
 RNG = np.random.default_rng(20)

@@ -26,7 +26,7 @@ WRONG = [
     ("mass = 2.0", "mas = 2.0",
      f'bodies[0] "link1".mas: expected a key among {BODY_KEYS}; got "mas". Use "mass".'),
     ("[aero.plate]", "[aero.plat]",
-     'aero.plat: expected a key among name, model, bodies, plate, field, flow, fmu, python; '
+     'aero.plat: expected a key among name, model, bodies, plate, field, flow, vortex, fmu, python; '
      'got "plat". Use "plate".'),
     ("[dynamics]", "[dynamic]",
      f'dynamic: expected a key among {TOP_KEYS}; got "dynamic". Use "dynamics".'),
@@ -54,7 +54,7 @@ WRONG = [
      "dynamics.stabilisation_time: expected at least an integrator step, 0.001 s: less would be unstable; "
      "got 0.0001. Take ten steps or more."),
     ('model = "plate"', 'model = "lbm"',
-     'aero.model: expected one of none, field, plate, flow, fmu, python; got "lbm". Use one of these.'),
+     'aero.model: expected one of none, field, plate, flow, vortex, fmu, python; got "lbm". Use one of these.'),
     # types
     ("mass = 2.0", 'mass = "2 kg"',
      'bodies[0] "link1".mass: expected a number [kg]; got "2 kg". Write the number alone, without '
@@ -146,7 +146,7 @@ WRONG = [
     ("[aero.plate]", '[aero.field.link3]\nfx = "1"\n[aero.plate]',
      'aero.field.link3: expected one of its bodies link1, link2; got "link3". Use "link2".'),
     ("[aero]", '[[providers]]\nname = "cfd"\nmodel = "plats"\n[aero]',
-     'providers[0] "cfd".model: expected one of none, field, plate, flow, fmu, python; got "plats". '
+     'providers[0] "cfd".model: expected one of none, field, plate, flow, vortex, fmu, python; got "plats". '
      'Use "plate".'),
     # topology
     ('child = "link2"', 'child = "link1"',

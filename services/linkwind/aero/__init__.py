@@ -21,6 +21,7 @@ from linkwind.aero.none import Vacuum
 from linkwind.aero.plate import Plate
 from linkwind.aero.python import PythonForces
 from linkwind.aero.source import PythonSource, python_source
+from linkwind.aero.vortex import Vortex
 from linkwind.errors import InputError
 from linkwind.scenario import Provider, Scenario
 
@@ -31,6 +32,7 @@ MODELS: dict[str, Callable[[Scenario, Provider], ForceModel]] = {
     "field": ForceField,
     "plate": Plate,
     "flow": Flow,
+    "vortex": Vortex,
 }
 
 OWN = ("fmu", "python")  # models that are made from what the user has beside the scenario

@@ -18,7 +18,7 @@ from linkwind.fmi.host.instances import Instances
 from linkwind.fmi.host.links import Mapping, elements
 from linkwind.fmi.host.planning import differentiates, interface, own_step_ns, stepping
 from linkwind.fmi.host.transfer import Inputs, Outputs
-from linkwind.native.forces import wind_at
+from linkwind.native.wind import wind_at
 from linkwind.scenario import Provider, Scenario
 from linkwind.scenario.providers import FmuModel
 from linkwind.spatial import Array, Motion, Wrench

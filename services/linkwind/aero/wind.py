@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from linkwind.native.forces import GUST_SHAPES, WindTable
+from linkwind.native.wind import GUST_SHAPES, WindTable
 from linkwind.scenario import Environment
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwind.native.library import declare
+from linkwind.native.wind import WindStruct, WindTable
 from linkwind.spatial import Array, Motion, Wrench, address
 
 Indices = NDArray[np.int32]
@@ -23,29 +24,12 @@ VARIABLES = ("t", "x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz", "theta")
 COMPONENTS = ("fx", "fy", "fz", "tx", "ty", "tz")
 
 
-GUST_SHAPES = {"sine": 0, "one_minus_cosine": 1}  # fmu/aero/lw_wind.h
-
-
 class Coefficients(enum.IntEnum):
     """Coefficient sets of the plate (``fmu/aero/lw_plate.h``)."""
 
     RISTROPH = 0
     ANDERSEN = 1
     TABLE = 2
-
-
-@dataclass(frozen=True)
-class WindTable:
-    """A uniform stream with travelling gusts: U0 + Σ a s(2π(f t + k·r) + φ).
-
-    Attributes:
-        uniform: U0 [m/s], shape (3,), in W.
-        gusts: a [m/s] (3), f [Hz], k [1/m] (3), φ [rad], shape s as ``GUST_SHAPES`` of each gust, shape
-            (n, 9), a and k in W.
-    """
-
-    uniform: Array
-    gusts: Array
 
 
 @dataclass(frozen=True)
@@ -101,12 +85,6 @@ class _Pointers3(ctypes.Structure):
     _fields_ = [(name, ctypes.c_void_p) for name in ("force", "torque", "added_inertia")]
 
 
-class _Wind(ctypes.Structure):
-    """``lw_wind``."""
-
-    _fields_ = [("uniform", ctypes.c_double * 3), ("n_gusts", ctypes.c_int), ("gusts", ctypes.c_void_p)]
-
-
 class _Plates(ctypes.Structure):
     """``lw_plates``."""
 
@@ -119,7 +97,7 @@ class _Plates(ctypes.Structure):
         ("size", ctypes.c_void_p),
         ("curves", ctypes.c_void_p),
         ("density", ctypes.c_double),
-        ("wind", _Wind),
+        ("wind", WindStruct),
     ]
 
 
@@ -133,18 +111,6 @@ class _Field(ctypes.Structure):
         ("code", ctypes.c_void_p),
         ("constants", ctypes.c_void_p),
     ]
-
-
-class _Vec3(ctypes.Structure):
-    """``lw_vec3``."""
-
-    _fields_ = [(name, ctypes.c_double) for name in "xyz"]
-
-
-class _WindSample(ctypes.Structure):
-    """``lw_wind_sample``."""
-
-    _fields_ = [("velocity", _Vec3), ("rate", _Vec3)]
 
 
 class _Bound:
@@ -172,29 +138,6 @@ def _index_address(array: Indices) -> int:
     return int(array.__array_interface__["data"][0])
 
 
-def _wind_struct(wind: WindTable) -> _Wind:
-    at = address(wind.gusts) if len(wind.gusts) else None
-    return _Wind((ctypes.c_double * 3)(*wind.uniform), len(wind.gusts), at)
-
-
-def wind_at(wind: WindTable, t: float, r: Array, v: Array) -> tuple[Array, Array]:
-    """Return the wind at a point that moves, and its rate of change there.
-
-    Args:
-        wind: the wind.
-        t: time [s].
-        r: the point [m], shape (3,), in W.
-        v: the point's velocity [m/s], shape (3,), in W.
-
-    Returns:
-        Velocity [m/s] and total derivative ∂U/∂t + (v·∇)U [m/s²], each of shape (3,), in W.
-    """
-    function = declare("lw_wind_at", [ctypes.c_void_p, ctypes.c_double, _Vec3, _Vec3], _WindSample)
-    sample = function(ctypes.byref(_wind_struct(wind)), t, _Vec3(*r), _Vec3(*v))
-    velocity, rate = sample.velocity, sample.rate
-    return np.array([velocity.x, velocity.y, velocity.z]), np.array([rate.x, rate.y, rate.z])
-
-
 class Plates:
     """Quasi-steady flat plates.
 
@@ -214,7 +157,7 @@ class Plates:
             address(table.size),
             address(table.curves) if table.curves.size else None,
             table.density,
-            _wind_struct(table.wind),
+            WindStruct.of(table.wind),
         )
         self.at = ctypes.addressof(self._struct)
         arguments = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_void_p]

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import ctypes
 import math
-import weakref
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwind.errors import LinkwindError
 from linkwind.native.library import declare
+from linkwind.native.threads import team
 
 Floats = NDArray[np.float32]
 
@@ -112,19 +111,12 @@ class Lattice:
         self.shear_rate, self.stream = shear_rate, stream
         self.struct_address = ctypes.addressof(self._struct)
         if threads > 1:
-            self._start_threads()
+            self._struct.threads = team(self, self.threads)
         number, pointer = ctypes.c_int32, ctypes.c_void_p
         self._step = declare("lw_lattice_step", [pointer, number, number], None)
         self._moments = declare("lw_lattice_moments", [pointer, number, pointer, pointer], None)
         self._halve_step = declare("lw_lattice_halve_step", [pointer, ctypes.c_float])
         declare("lw_lattice_init", [pointer], None)(self.struct_address)
-
-    def _start_threads(self) -> None:
-        destroy = declare("lw_threads_destroy", [ctypes.c_void_p], None)
-        self._struct.threads = declare("lw_threads_create", [ctypes.c_int32], ctypes.c_void_p)(self.threads)
-        if not self._struct.threads:
-            raise LinkwindError(f"threads: expected to start {self.threads}; the system refused. Use fewer.")
-        weakref.finalize(self, destroy, self._struct.threads)
 
     @property
     def populations(self) -> Floats:

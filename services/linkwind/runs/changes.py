@@ -11,7 +11,7 @@ from linkwind.errors import ScenarioError
 from linkwind.scenario import Scenario, from_json
 
 # Settings that say how a run is done; no number that it gives depends on them.
-HOW = r"bus\..*|log\..*|coupling\.timeout|description|providers\.\d+\.flow\.threads"
+HOW = r"bus\..*|log\..*|coupling\.timeout|description|providers\.\d+\.(flow|vortex)\.threads"
 # Settings that may change from a communication point on; what bodies and providers remember stays right.
 PHYSICS = (
     r"time\.end|environment\..*|joints\.\d+\.(stiffness|damping|rest).*|dynamics\.(integrator|substeps|rtol|atol)"

@@ -172,7 +172,7 @@ def _provider_model(scenario: Scenario, provider: Provider, path: Path) -> Itera
         expected = "a table for at least one body"
         advice = f'Add a table for a body, such as {_first(provider.bodies)}, with fx = "…".'
         yield Problem((*path, "field"), expected, "nothing", advice)
-    if provider.model == "plate":
+    if provider.model in ("plate", "vortex"):
         for index, body in enumerate(scenario.bodies):
             if body.name in provider.bodies and (body.shape is None or body.shape.type != "plate"):
                 expected = f'a plate, which the model of provider "{provider.name}" needs'
@@ -180,6 +180,13 @@ def _provider_model(scenario: Scenario, provider: Provider, path: Path) -> Itera
                 advice = f'{"Write" if body.shape else "Add"} shape = {{ type = "plate", length = … }}.'
                 yield Problem(("bodies", index, "shape"), expected, got, advice)
 
+    for name in provider.vortex.trailing_edge:
+        if name not in provider.bodies:
+            yield choice((*path, "vortex", "trailing_edge", name), "one of its bodies", provider.bodies, name)
+    if provider.model == "vortex" and scenario.environment.density == 0.0:
+        yield Problem(
+            ("environment", "density"), "a number above 0 for the model vortex", "0", "Give it one."
+        )
     if provider.model == "flow":
         yield from _flow(scenario, provider, path)
 

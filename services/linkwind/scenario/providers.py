@@ -11,8 +11,14 @@ from linkwind.scenario.polars import COLUMNS, Rows
 from linkwind.scenario.problems import Problem, ProblemError
 from linkwind.scenario.quantities import Name, Section, Vector, quantity
 
-AeroModel = Literal["none", "field", "plate", "flow", "fmu", "python"]
-ADDING_INERTIA: tuple[AeroModel, ...] = ("plate", "flow", "fmu", "python")  # that may move massless bodies
+AeroModel = Literal["none", "field", "plate", "flow", "vortex", "fmu", "python"]
+ADDING_INERTIA: tuple[AeroModel, ...] = (
+    "plate",
+    "flow",
+    "vortex",
+    "fmu",
+    "python",
+)  # that may move massless bodies
 PlateCoefficients = Literal["ristroph", "andersen", "table"]
 
 
@@ -114,6 +120,34 @@ class FlowModel(Section):
         ge=0.0,
     )
     frames: int = Field(default=48, ge=0, le=10000, description="Pictures of the flow in the log of a run")
+    threads: int = Field(
+        default=1, ge=1, le=256, description="Threads that share the work; no bit depends on it"
+    )
+
+
+class VortexModel(Section):
+    """Settings of the flow around thin wings in three dimensions: vortex rings, and wakes of them."""
+
+    chordwise: int = Field(default=6, ge=1, le=100, description="Rings along the chord of each plate")
+    spanwise: int = Field(default=12, ge=1, le=200, description="Rings along the span of each plate")
+    wake: int = Field(
+        default=100,
+        ge=1,
+        le=10000,
+        description="Rows of rings that each wake keeps; one is shed in a communication step",
+    )
+    core: float = quantity(
+        "Radius of the cores of the wakes' vortices, in chords of the shortest plate",
+        "1",
+        0.05,
+        gt=0.0,
+        le=1.0,
+    )
+    trailing_edge: dict[str, Literal["+x", "-x"]] = Field(
+        default={},
+        description="Which edge of a plate sheds its wake, by body, in its frame; default: the downstream "
+        "one at the start",
+    )
     threads: int = Field(
         default=1, ge=1, le=256, description="Threads that share the work; no bit depends on it"
     )
@@ -230,5 +264,6 @@ class Provider(Section):
         default={}, description="The model field: a table for each body, by its name"
     )
     flow: FlowModel = Field(default=FlowModel(), description="Settings of the model flow")
+    vortex: VortexModel = Field(default=VortexModel(), description="Settings of the model vortex")
     fmu: FmuModel = Field(default=FmuModel(), description="Settings of the model fmu")
     python: PythonModel = Field(default=PythonModel(), description="Settings of the model python")

@@ -1,0 +1,168 @@
+"""The force model: the lattice of rings, when it sheds, and what is said when it fails."""
+
+from __future__ import annotations
+
+import logging
+import math
+
+import numpy as np
+
+from linkwind.aero.base import Capabilities, body_indices, item
+from linkwind.aero.vortex.surface import plates, surfaces, trailing
+from linkwind.aero.wind import wind_table
+from linkwind.errors import ProtocolError, SimulationError
+from linkwind.native.vortex import VortexLattice
+from linkwind.native.wind import wind_at
+from linkwind.scenario import Provider, Scenario
+from linkwind.spatial import Array, Motion, Wrench
+
+_log = logging.getLogger("linkwind")
+
+
+class Vortex:
+    """Forces of an inviscid, unsteady flow around thin wings that shed free wakes from their trailing edges.
+
+    The wrench [N, N·m] is the mean over a communication step, in W at the centres of mass, and comes with
+    ``G``; ``evaluate`` changes nothing, ``commit`` sheds a row of rings and carries the wakes on.
+
+    Diagnostics: ``incidence_deg``, the largest angle of attack of the fastest of centre and tips of a wing
+    (above 15 to 20° the flow over a real one separates, which this one does not); ``advance``, how many
+    panels the fastest point goes in a step (at 1 the wake is as fine as the wing); ``wake_rows``, of rings.
+
+    Sources: J. Katz, A. Plotkin, Low-Speed Aerodynamics, 2nd ed., Cambridge 2001, ch. 13;
+    R. J. S. Simpson, R. Palacios, J. Murua, AIAA J. 51(7), 2013, doi:10.2514/1.J052136 (forces).
+    """
+
+    def __init__(self, scenario: Scenario, provider: Provider) -> None:
+        """Take the plates; the rings are laid when the first motion tells where the air comes from.
+
+        Raises:
+            ScenarioError: a body is no plate.
+        """
+        self._scenario, self._provider = scenario, provider
+        self._size = plates(scenario, provider)
+        self._rows = np.array(body_indices(scenario, provider))
+        self._wind = wind_table(scenario.environment)
+        self._h = scenario.coupling.step_ns / 1e9
+        self._lattice: VortexLattice | None = None
+        self._sides = np.zeros(len(self._rows))
+        self._evaluated, self._committed = math.nan, math.nan  # times of the last trial and accepted states
+        self.capabilities = Capabilities(
+            kind="mean",
+            response_size=(6 * len(self._rows)) ** 2,
+            own_step_ns=0,
+            diagnostics=("incidence_deg", "advance", "wake_rows"),
+        )
+
+    def commit(self, t: float, motion: Motion) -> None:
+        """Shed what the edges leave behind at time t [s], and carry the wakes on to the next one."""
+        if t == self._committed:
+            return
+        pose, twist = self._state(motion)
+        if t != self._evaluated:  # as at the start, before the first question
+            self._solve(t, motion, pose, twist)
+        self._made(t, motion).commit(t, pose, twist)
+        self._committed = t
+
+    def evaluate(self, t: float, motion: Motion, wrench: Wrench) -> None:
+        """Write the mean wrench over the step that ends in the trial state at time t [s].
+
+        Raises:
+            ScenarioError: at the start, it is not clear which edge trails.
+            SimulationError: no strengths of the rings let nothing through, or a force is not finite.
+        """
+        pose, twist = self._state(motion)
+        lattice = self._solve(t, motion, pose, twist)
+        wrench.force[:], wrench.torque[:] = lattice.wrench[:, :3], lattice.wrench[:, 3:]
+        if wrench.response is not None:
+            wrench.response[:] = lattice.response
+        if wrench.diagnostics is not None:
+            wrench.diagnostics[:] = (*self._incidence(t, motion), lattice.rows)
+
+    def save(self) -> bytes:
+        """Return wakes, strengths and trailing edges as committed; empty before the first motion."""
+        if self._lattice is None or math.isnan(self._committed):
+            return b""
+        return np.array([self._committed, *self._sides], "<f8").tobytes() + self._lattice.save()
+
+    def restore(self, blob: bytes) -> None:
+        """Take back what ``save`` returned.
+
+        Raises:
+            ProtocolError: the blob is not one of these wings.
+        """
+        self._evaluated, self._committed = math.nan, math.nan
+        self._lattice = None
+        if not blob:
+            return
+        head = 8 * (1 + len(self._rows))
+        try:
+            if len(blob) < head:
+                raise ValueError(f"{head} bytes and more; got {len(blob)}")
+            self._committed, *sides = np.frombuffer(blob[:head], "<f8").tolist()
+            if not set(sides) <= {-1.0, 1.0}:
+                raise ValueError(f"trailing edges at 1 or -1; got {sides}")
+            self._lay(np.array(sides)).restore(blob[head:])
+        except ValueError as error:
+            raise ProtocolError(f"model vortex: expected a checkpoint of {error}.") from error
+
+    @property
+    def lattice(self) -> VortexLattice:
+        """The rings on the wings and in the wakes; there is none before the first motion."""
+        if self._lattice is None:
+            raise ProtocolError("model vortex: expected a first motion, at t = 0; got none.")
+        return self._lattice
+
+    # ---- one step ----
+
+    def _state(self, motion: Motion) -> tuple[Array, Array]:
+        rows = self._rows
+        pose = np.hstack([motion.position[rows], motion.orientation[rows]])
+        return pose, np.hstack([motion.linear[rows], motion.angular[rows]])
+
+    def _made(self, t: float, motion: Motion) -> VortexLattice:
+        if self._lattice is not None:
+            return self._lattice
+        at_rest = np.zeros(3)
+        wind = np.array([wind_at(self._wind, t, motion.position[body], at_rest)[0] for body in self._rows])
+        return self._lay(trailing(self._scenario, self._provider, motion, wind))
+
+    def _lay(self, sides: Array) -> VortexLattice:
+        table = surfaces(self._scenario, self._provider, sides)
+        self._sides, self._lattice = sides, VortexLattice(table, self._provider.vortex.threads)
+        _log.info(
+            '"%s": %d wings of %d × %d vortex rings, wakes of up to %d rows',
+            self._provider.name, *table.shape, table.rows,
+        )  # fmt: skip
+        return self._lattice
+
+    def _solve(self, t: float, motion: Motion, pose: Array, twist: Array) -> VortexLattice:
+        lattice = self._made(t, motion)
+        solved = lattice.evaluate(t, pose, twist)
+        self._evaluated = t
+        if not solved or not all(map(math.isfinite, lattice.wrench.ravel().tolist())):
+            names = ", ".join(f'"{name}"' for name in self._provider.bodies)
+            got = lattice.wrench.tolist() if solved else "rings that lie in each other"
+            raise SimulationError(
+                f"{item(self._scenario, self._provider, 'vortex')}: expected a finite force on {names} at "
+                f"t = {t:.6g} s; got {got}. Has the motion diverged, or do wings touch? Try a smaller "
+                "coupling.step, or a larger core."
+            )
+        return lattice
+
+    def _incidence(self, t: float, motion: Motion) -> tuple[float, float]:
+        """Return the largest angle of attack [deg], and the most panels that a point goes in a step."""
+        largest, farthest = 0.0, 0.0
+        axes = motion.rotation()[self._rows]
+        for body, plate, (x, y, z) in zip(self._rows, self._size, np.swapaxes(axes, 1, 2), strict=True):
+            wind = wind_at(self._wind, t, motion.position[body], np.zeros(3))[0]
+            speed, angle = 0.0, 0.0
+            for place in (-0.5, 0.0, 0.5):
+                arm = np.cross(motion.angular[body], place * plate.span * z)
+                air = (wind - motion.linear[body] - arm).tolist()
+                along, across = (sum(a * b for a, b in zip(air, e.tolist(), strict=True)) for e in (x, y))
+                if math.hypot(along, across) > speed:
+                    speed, angle = math.hypot(along, across), math.atan2(abs(across), abs(along))
+            largest = max(largest, math.degrees(angle))
+            farthest = max(farthest, speed * self._h * self._provider.vortex.chordwise / plate.length)
+        return largest, farthest
