@@ -54,7 +54,8 @@ WRONG = [
      "dynamics.stabilisation_time: expected at least an integrator step, 0.001 s: less would be unstable; "
      "got 0.0001. Take ten steps or more."),
     ('model = "plate"', 'model = "lbm"',
-     'aero.model: expected one of none, field, plate, flow, vortex, fmu, python; got "lbm". Use one of these.'),
+     'aero.model: expected one of none, field, plate, flow, vortex, fmu, python; got "lbm". '
+     'Use one of these.'),
     # types
     ("mass = 2.0", 'mass = "2 kg"',
      'bodies[0] "link1".mass: expected a number [kg]; got "2 kg". Write the number alone, without '

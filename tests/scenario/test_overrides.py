@@ -88,7 +88,8 @@ def test_aero_can_be_set_where_the_file_has_no_provider():
         ("bodies.link1.mass=inf",
          'bodies[0] "link1".mass: expected a finite number [kg]; got inf. Change the value.'),
         ("aero.model=plats",
-         'aero.model: expected one of none, field, plate, flow, vortex, fmu, python; got "plats". Use "plate".'),
+         'aero.model: expected one of none, field, plate, flow, vortex, fmu, python; got "plats". '
+         'Use "plate".'),
         ("bodies=3", "bodies: expected a list; got 3. Write it as [[table]] or [a, b]."),
     ],
 )  # fmt: skip
