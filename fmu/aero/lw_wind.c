@@ -7,7 +7,7 @@ typedef struct { double value, slope; } lw_shape;
 
 static lw_shape shape_at(double shape, double phase) {
     lw_shape at = {0.0, 0.0};
-    if (shape == LW_SINE) {
+    if (shape == (double)LW_SINE) {
         at.value = sin(phase);
         at.slope = cos(phase);
     } else if (phase >= 0.0 && phase <= two_pi) {

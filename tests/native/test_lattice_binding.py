@@ -1,20 +1,12 @@
 """The lattice's binding: the same bits everywhere, views, moments, states, refusals."""
 
-import ctypes
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from linkwind.native import lattice as module
 from linkwind.native.lattice import Lattice, shear_rate
-from tests.fmu.c_model import C, build_hook
+from tests.native.builds import BUILDS, compiled, use
 from tests.native.flows import CX, CY, smooth_noise, taylor_green
-
-FLAGS = Path("/proc/cpuinfo")
-SETS = {"sse2": (), "avx2": ("-mavx2",), "avx512f": ("-mavx512f",)}
 
 
 def run(threads=1, size=(100, 90), forced=True):
@@ -34,46 +26,10 @@ def test_bits_do_not_depend_on_the_number_of_threads(threads):
     assert run(threads) == run()
 
 
-@pytest.fixture(scope="module")
-def compiled(tmp_path_factory):
-    """Compile the lattice for one set of instructions, and load it."""
-
-    def load(name, command, extra):
-        file = tmp_path_factory.mktemp(name) / "lattice.so"
-        hook = build_hook()
-        sources = map(str, sorted((C / "flow").glob("*.c")))
-        arguments = [*hook.FLAGS, *hook.WARNINGS, "-Werror", "-O3", "-pthread", "-shared", *extra]
-        arguments += [f"-I{C / 'core'}", "-o", str(file), *sources, "-lm"]
-        subprocess.run([*command, *arguments], check=True)
-        return ctypes.CDLL(str(file))
-
-    return load
-
-
-def use(monkeypatch, library):
-    """Let new lattices call another library."""
-
-    def declare(name, arguments, result=ctypes.c_int):
-        function = getattr(library, name)
-        function.argtypes, function.restype = list(arguments), result
-        return function
-
-    monkeypatch.setattr(module, "declare", declare)
-
-
-@pytest.mark.parametrize("name", SETS)
-def test_bits_do_not_depend_on_the_set_of_instructions(name, compiled, monkeypatch):
-    if not FLAGS.exists() or name not in FLAGS.read_text():
-        pytest.skip(f"this processor has no {name}")
+@pytest.mark.parametrize("name", BUILDS)
+def test_bits_do_not_depend_on_instructions_and_compiler(name, tmp_path, monkeypatch):
     expected = run()
-    use(monkeypatch, compiled(name, build_hook().compiler(), ("-DLW_ONE_VERSION", *SETS[name])))
-    assert run() == expected
-
-
-def test_bits_do_not_depend_on_the_compiler(compiled, monkeypatch):
-    pytest.importorskip("ziglang")
-    expected = run()
-    use(monkeypatch, compiled("zig", [sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline"], ()))
+    use(monkeypatch, module, compiled(name, tmp_path))
     assert run() == expected
 
 
