@@ -1,15 +1,12 @@
 /* Groups of points stand still, filaments pass by: a sum never depends on who computes it. */
 #include "lw_filaments.h"
 
-#include "lw_instructions.h"
-
 enum { GROUPS = 4 }; /* of points, that a thread takes at a time */
 
 typedef struct {
     const lw_filament *filaments;
     const lw_points *points;
     int32_t count;
-    lw_instructions instructions;
 } add_job;
 
 static const double PI = 3.14159265358979323846;
@@ -64,7 +61,7 @@ __attribute__((target("avx512f"))) static void add_avx512(const add_job *job, in
 
 static void add_part(const void *any, int32_t part) {
     const add_job *job = any;
-    switch (job->instructions) {
+    switch (job->points->instructions) {
     case LW_AVX512: add_avx512(job, part); return;
     case LW_AVX2: add_avx2(job, part); return;
     default: add_plain(job, part);
@@ -74,9 +71,8 @@ static void add_part(const void *any, int32_t part) {
 static void add_part(const void *any, int32_t part) { add_plain(any, part); }
 #endif
 
-void lw_filaments_add(const lw_filament *filaments, int32_t count, const lw_points *points,
-                      lw_threads *threads) {
-    const add_job job = {filaments, points, count, lw_instructions_here()};
+void lw_filaments_add(const lw_filament *filaments, int32_t count, const lw_points *points) {
+    const add_job job = {filaments, points, count};
     const int32_t size = GROUPS * LW_LANES;
-    lw_threads_run(threads, add_part, &job, (points->count + size - 1) / size);
+    lw_threads_run(points->threads, add_part, &job, (points->count + size - 1) / size);
 }

@@ -21,6 +21,8 @@ static sizes sizes_of(const lw_vortex *v) {
     return z;
 }
 
+void lw_vortex_init(lw_vortex *v) { v->instructions = (int32_t)lw_instructions_here(); }
+
 int32_t lw_vortex_targets(const lw_vortex *v) { return sizes_of(v).targets; }
 
 int32_t lw_vortex_points(const lw_vortex *v) {
@@ -96,7 +98,7 @@ static lw_vec3 at(double *const axes[3], int32_t k) { return lw_vec(axes[0][k], 
 
 lw_points lw_vortex_room(const lw_vortex *v, int32_t count) {
     const int32_t apart = lw_vortex_points(v);
-    lw_points points = {.count = lw_lanes(count)};
+    lw_points points = {.count = lw_lanes(count), .instructions = v->instructions, .threads = v->threads};
     for (int axis = 0; axis < 3; ++axis) {
         points.at[axis] = v->points + (size_t)axis * apart;
         points.velocity[axis] = v->points + (size_t)(3 + axis) * apart;
@@ -157,7 +159,7 @@ static void influence(lw_vortex *v, const lw_points *targets) {
             lw_store3(filament.a, lw_load3(placed + 3 * f.from));
             lw_store3(filament.b, lw_load3(placed + 3 * f.to));
             for (int axis = 0; axis < 3; ++axis) fill(targets->velocity[axis], (size_t)targets->count);
-            lw_filaments_add(&filament, 1, targets, v->threads);
+            lw_filaments_add(&filament, 1, targets);
             for (int axis = 0; axis < 3; ++axis) {
                 const double *by = targets->velocity[axis];
                 double *with = v->influence + (size_t)f.with * size + axis * z.targets;
@@ -174,7 +176,7 @@ static void influence(lw_vortex *v, const lw_points *targets) {
 static void meet(lw_vortex *v, const lw_points *targets, double t, const double *pose, const double *twist) {
     const sizes z = sizes_of(v);
     const int32_t count = v->surfaces * (z.rings + z.bearers), wakes = lw_wake_filaments(v, v->filaments);
-    lw_filaments_add(v->filaments, wakes, targets, v->threads);
+    lw_filaments_add(v->filaments, wakes, targets);
     for (int32_t k = 0; k < count; ++k) {
         const int32_t rings = v->surfaces * z.rings;
         const int32_t b = k < rings ? k / z.rings : (k - rings) / z.bearers;
@@ -345,7 +347,7 @@ void lw_vortex_velocity(lw_vortex *v, double t, int32_t count, const double *poi
         const int32_t some = count - first < room ? count - first : room;
         const lw_points points = lw_vortex_room(v, some);
         for (int32_t k = 0; k < some; ++k) put(&points, k, lw_load3(point + 3 * (first + k)));
-        lw_filaments_add(v->filaments, filaments, &points, v->threads);
+        lw_filaments_add(v->filaments, filaments, &points);
         for (int32_t k = 0; k < some; ++k) {
             const lw_vec3 r = at(points.at, k), zero = {0.0, 0.0, 0.0};
             const lw_vec3 wind = lw_wind_at(&v->wind, t, r, zero).velocity;

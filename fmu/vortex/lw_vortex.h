@@ -20,6 +20,7 @@
 typedef struct {
     int32_t surfaces, chordwise, spanwise; /* n, c, s */
     int32_t capacity;                      /* rows of wake rings that are kept at most */
+    int32_t instructions;                  /* lw_instructions; written by lw_vortex_init */
     double density, step, core;            /* [kg/m^3]; h [s]; radius of the wakes' cores [m] */
     lw_wind wind;
     const double *corner;  /* (n, c + 1, s + 1, 3) in the frame of the body [m] */
@@ -49,6 +50,9 @@ typedef struct {
     double *change;           /* (3, lw_vortex_targets) by a component of the twist: velocity at the targets */
     double *gained, *row;     /* (n c s) strengths in a step; (6 n) */
 } lw_vortex;
+
+/* Before everything else. */
+LW_API void lw_vortex_init(lw_vortex *vortex);
 
 /* How long the working arrays are. Targets: collocation points, then the middles of filaments that bear force. */
 LW_API int32_t lw_vortex_filaments(const lw_vortex *vortex);

@@ -57,7 +57,7 @@ void lw_wake_go(lw_vortex *v, double t) {
         const double *from = edge(v, k % across / (s + 1), k / across, k % (s + 1));
         for (int axis = 0; axis < 3; ++axis) points.at[axis][k] = from[axis];
     }
-    lw_filaments_add(v->filaments, filaments, &points, v->threads);
+    lw_filaments_add(v->filaments, filaments, &points);
     for (int32_t k = 0; k < rows * across; ++k) {
         const lw_vec3 r = lw_vec(points.at[0][k], points.at[1][k], points.at[2][k]), zero = {0.0, 0.0, 0.0};
         const lw_vec3 u = lw_vec(points.velocity[0][k], points.velocity[1][k], points.velocity[2][k]);

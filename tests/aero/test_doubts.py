@@ -54,3 +54,21 @@ def test_bodies_too_light_for_several_lattice_steps(tmp_path, caplog: pytest.Log
 
 def test_heavy_ones_go_on(caplog: pytest.LogCaptureFixture) -> None:
     assert list(doubts(load("two_link_flow", LIGHT[:2]))) == []
+
+
+@pytest.mark.parametrize(
+    ("settings", "told"),
+    [
+        (["coupling.step=2e-3"], None),
+        (
+            ["coupling.step=1e-2"],
+            "in a step, and as long are the rings of its wake; one is enough. Use about",
+        ),
+        (["coupling.step=1e-3", "aero.vortex.wake=30"], "30 rows reach 2.7 chords behind the wings"),
+    ],
+)
+def test_wakes_that_are_coarse_or_short(settings: list[str], told: str | None) -> None:
+    """At 9 m/s the chord of the tail, 0.1 m, takes 11 ms, a panel of six 1.9 ms."""
+    found = list(doubts(load("flapper", ["aero.model=vortex", *settings])))
+    assert len(found) == (told is not None)
+    assert all(told in doubt for doubt in found if told)

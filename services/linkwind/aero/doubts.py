@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from linkwind.aero.base import item
+from linkwind.aero.base import body_indices, item
 from linkwind.aero.flow import grid as grids
 from linkwind.scenario import Provider, Scenario
 
@@ -13,6 +13,8 @@ WITHOUT_WIND = ("none", "field")  # models that read no wind from the scenario
 # Without the response a body wants so many times the mass of fluid that it accelerates, by the number of
 # lattice steps in a communication step; measured on free plates.
 WANTED = ((2, 1.0), (math.inf, 2.0))
+COARSE = 2.0  # panels that a wing goes in a step: above, lift after a sudden change is some percent off
+SHORT = 4.0  # chords: what a shorter wake leaves out is felt
 
 
 def doubts(scenario: Scenario) -> Iterator[str]:
@@ -21,6 +23,8 @@ def doubts(scenario: Scenario) -> Iterator[str]:
     for provider in scenario.providers:
         if provider.model == "flow":
             yield from _too_light(scenario, provider)
+        if provider.model == "vortex":
+            yield from _wake_too_coarse_or_short(scenario, provider)
 
 
 def _no_wind(scenario: Scenario) -> Iterator[str]:
@@ -49,3 +53,25 @@ def _too_light(scenario: Scenario, provider: Provider) -> Iterator[str]:
                 f"{scenario.coupling.step:g} s, as here, that is stable for bodies of {wanted:g} times that "
                 f"mass and more. Should the run diverge, use at most {grid.step:.2g} s."
             )
+
+
+def _wake_too_coarse_or_short(scenario: Scenario, provider: Provider) -> Iterator[str]:
+    wind, settings = scenario.environment.wind, provider.vortex
+    speeds = [math.dist(wind, body.velocity or (0.0, 0.0, 0.0)) for body in scenario.bodies]
+    chord = min(
+        getattr(scenario.bodies[index].shape, "length", math.inf)
+        for index in body_indices(scenario, provider)
+    )
+    far = max(speeds) * scenario.coupling.step / chord  # chords in a step, at the start
+    if far * settings.chordwise > COARSE:
+        yield (
+            f"{scenario.source}: coupling.step: at the start the air passes {far * settings.chordwise:.2g} "
+            f'panels of "{provider.name}" in a step, and as long are the rings of its wake; one is enough. '
+            f"Use about {scenario.coupling.step / (far * settings.chordwise):.2g} s."
+        )
+    elif 0.0 < far * settings.wake < SHORT:
+        yield (
+            f"{item(scenario, provider, 'vortex', 'wake')}: at the start {settings.wake} rows reach "
+            f"{far * settings.wake:.2g} chords behind the wings, and what a shorter wake than {SHORT:g} "
+            f"leaves out is felt. Use {math.ceil(SHORT / far)} or more, or a larger coupling.step."
+        )

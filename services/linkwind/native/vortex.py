@@ -46,7 +46,7 @@ class SurfaceTable:
         return n, chordwise, spanwise
 
 
-_NUMBERS = ("surfaces", "chordwise", "spanwise", "capacity")
+_NUMBERS = ("surfaces", "chordwise", "spanwise", "capacity", "instructions")
 _REMEMBERED = ("strength", "steady", "wake", "wake_rings")
 _TRIAL = ("trial_twist", "trial_strength", "trial_steady", "by_twist", "steady_by_twist")
 _ROOM = (
@@ -100,8 +100,9 @@ class VortexLattice:
         n, c, s = table.shape
         self.wrench, self.response = np.zeros((n, 6)), np.zeros((6 * n, 6 * n))
         self._pose, self._twist = np.zeros((n, 7)), np.zeros((n, 6))
-        self._struct = _Vortex(n, c, s, table.rows, table.density, table.step, table.core)
+        self._struct = _Vortex(n, c, s, table.rows, 0, table.density, table.step, table.core)
         self._self = ctypes.addressof(self._struct)
+        declare("lw_vortex_init", [ctypes.c_void_p], None)(self._self)
         self._struct.wind = WindStruct.of(table.wind)
         self._struct.threads = team(self, threads) if threads > 1 else None
         filaments, points, targets = (
