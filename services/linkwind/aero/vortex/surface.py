@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from linkwind.aero.base import body_indices, item
@@ -90,7 +92,7 @@ def trailing(scenario: Scenario, provider: Provider, motion: Motion, wind: Array
     for i, (name, body) in enumerate(zip(provider.bodies, body_indices(scenario, provider), strict=True)):
         stated = provider.vortex.trailing_edge.get(name)
         air = wind[i] - motion.linear[body]
-        along, speed = float(air @ axes[body][:, 0]), float(np.sqrt(air @ air))
+        along, speed = float(air @ axes[body][:, 0]), math.hypot(*air.tolist())
         if stated is None and not abs(along) > ACROSS * speed:
             raise ScenarioError(
                 f"{item(scenario, provider, 'vortex', 'trailing_edge')}: expected which edge of "
