@@ -460,10 +460,12 @@ def test_runs_are_found_and_told_apart(tmp_path: Path) -> None:
         assert described(listener.find(PATIENCE)).run == "s"
         with closing(ZenohListener([], endpoints[:1], "r")) as another:
             assert described(another.find(PATIENCE)).run == "r"
-        wait_until(lambda: "expected one run; got r, s. Choose one with --run" in _trouble(endpoints))
-        steering.toggle()
+    wait_until(lambda: "expected one run; got r, s. Choose one with --run" in _trouble(endpoints))
+    steering.toggle()
+    with closing(ZenohListener([], endpoints)):  # the replays wait for somebody who stays
         for job in jobs:
             job.done()
+            assert job.error is None
 
 
 def _trouble(endpoints: list[str]) -> str:

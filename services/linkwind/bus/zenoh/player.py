@@ -93,9 +93,15 @@ class ZenohPlayer:
             whether there is one.
         """
         end = time.monotonic() + timeout
-        while not self.heard and time.monotonic() < end:
+        while not (self.heard and self._stays(grace)):
+            if time.monotonic() >= end:
+                return False
             time.sleep(TICK)
-        end = time.monotonic() + grace
+        return True
+
+    def _stays(self, time_s: float) -> bool:
+        """Wait so long; tell whether somebody was subscribed all the while."""
+        end = time.monotonic() + time_s
         while self.heard and time.monotonic() < end:
             time.sleep(TICK)
         return self.heard
