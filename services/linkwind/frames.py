@@ -1,12 +1,13 @@
-"""Pictures of the fluid on a grid, as a force model shows them: arrays to bytes and back.
+"""Pictures of the fluid, as a force model shows them: arrays to bytes and back.
 
-The schema is ``schemas/linkwind/v1/observe.proto``.
+A frame is one of two kinds, the fluid on a grid (``flow``) or wings with their wakes (``wake``). The schema
+is ``schemas/linkwind/v1/observe.proto``.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from google.protobuf.message import DecodeError
@@ -19,7 +20,13 @@ from linkwind.wire import preamble
 Single = NDArray[np.float32]
 
 SINGLE = np.dtype("<f4")
-COMPONENTS = {"velocity": (2,), "pressure": (), "vorticity": ()}  # array of a frame: shape of a cell's value
+
+
+class Sent(NamedTuple):
+    """A frame on its way: its kind and its message."""
+
+    kind: str
+    payload: bytes
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +44,11 @@ class FlowFrame:
         pressure: relative to the undisturbed fluid [Pa], shape (rows, columns).
         vorticity: about z [1/s], shape (rows, columns).
     """
+
+    KIND: ClassVar = "flow"
+    MESSAGE: ClassVar = "FlowFrame"
+    PLACE: ClassVar = ("origin", "cell")
+    ARRAYS: ClassVar = ("velocity", "pressure", "vorticity")
 
     step: int
     time_ns: int
@@ -58,6 +70,12 @@ class FlowFrame:
         (x, y), (rows, columns), half = self.origin, self.shape, 0.5 * self.cell
         return x - half, x + (columns - 0.5) * self.cell, y - half, y + (rows - 0.5) * self.cell
 
+    @staticmethod
+    def shapes(about: Any) -> dict[str, tuple[int, ...]]:
+        """Return the shape of each array of a message."""
+        cells = (about.rows, about.columns)
+        return {"velocity": (*cells, 2), "pressure": cells, "vorticity": cells}
+
     def encode(self, run: str, provider: str, number: int) -> bytes:
         """Return the message FlowFrame.
 
@@ -74,44 +92,147 @@ class FlowFrame:
             run=run, provider=provider, number=number, step=self.step, time_ns=self.time_ns,
             rows=rows, columns=columns, cell=self.cell, origin_x=self.origin[0], origin_y=self.origin[1],
         )  # fmt: skip
-        parts = [message.SerializeToString()]
-        for name, inner in COMPONENTS.items():
-            array = getattr(self, name)
-            if array.shape != (rows, columns, *inner):
-                expected = (rows, columns, *inner)
-                raise ProtocolError(f'"{provider}": frame: {name}: expected {expected}; got {array.shape}')
-            field = message.DESCRIPTOR.fields_by_name[name]
-            data = np.ascontiguousarray(array, SINGLE).tobytes()
-            parts += [preamble(field.number, len(data)), data]
-        return b"".join(parts)
+        return _with_arrays(message, self, provider)
+
+    @classmethod
+    def of(cls, message: Any, arrays: dict[str, Single]) -> FlowFrame:
+        """Return the frame that a message holds."""
+        origin = (message.origin_x, message.origin_y)
+        return cls(message.step, message.time_ns, origin, message.cell, **arrays)
 
 
-def decode(payload: bytes, run: str, provider: str) -> tuple[int, FlowFrame]:
-    """Return the number of a message FlowFrame, and the frame.
+@dataclass(frozen=True, eq=False)
+class WakeFrame:
+    """Thin wings and their free wakes at one time, as rings of vortex filaments.
+
+    Each wing is one grid from its leading edge over the trailing edge to the end of its wake; a ring lies
+    between four corners.
+
+    Attributes:
+        step: index k of the communication point that wings and wakes are at.
+        time_ns: its simulation time t_k [ns].
+        bound: rows of rings that lie on the wing; the others are its wake.
+        corner: of the rings [m], shape (wings, rows + 1, columns + 1, 3), in W; wings in the order of the
+            provider's bodies, columns along the span.
+        strength: circulation of the rings [m²/s], shape (wings, rows, columns), right-handed about the way to
+            the next column × the way to the next row.
+    """
+
+    KIND: ClassVar = "wake"
+    MESSAGE: ClassVar = "WakeFrame"
+    PLACE: ClassVar = ("bound",)
+    ARRAYS: ClassVar = ("corner", "strength")
+
+    step: int
+    time_ns: int
+    bound: int
+    corner: Single
+    strength: Single
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Wings, and rows and columns of the rings of each."""
+        wings, rows, columns = self.strength.shape
+        return wings, rows, columns
+
+    @staticmethod
+    def shapes(about: Any) -> dict[str, tuple[int, ...]]:
+        """Return the shape of each array of a message."""
+        wings, rows, columns = about.wings, about.rows, about.columns
+        return {"corner": (wings, rows + 1, columns + 1, 3), "strength": (wings, rows, columns)}
+
+    def encode(self, run: str = "", provider: str = "", number: int = 0) -> bytes:
+        """Return the message WakeFrame; without arguments, as a log holds it.
+
+        Args:
+            run: id of the run.
+            provider: that shows the frame.
+            number: of the provider's frames, from 1.
+
+        Raises:
+            ProtocolError: an array has another shape than the strengths ask for.
+        """
+        wings, rows, columns = self.shape
+        sender = {"run": run, "provider": provider, "number": number} if number else {}
+        message = MESSAGES["WakeFrame"](
+            **sender, step=self.step, time_ns=self.time_ns,
+            wings=wings, rows=rows, columns=columns, bound=self.bound,
+        )  # fmt: skip
+        return _with_arrays(message, self, provider)
+
+    @classmethod
+    def of(cls, message: Any, arrays: dict[str, Single]) -> WakeFrame:
+        """Return the frame that a message holds."""
+        return cls(message.step, message.time_ns, message.bound, **arrays)
+
+
+Frame = FlowFrame | WakeFrame
+KINDS: dict[str, type[FlowFrame] | type[WakeFrame]] = {each.KIND: each for each in (FlowFrame, WakeFrame)}
+
+
+def decode(sent: Sent, run: str, provider: str) -> tuple[int, Frame]:
+    """Return the number of a frame that was sent, and the frame.
 
     Args:
-        payload: an encoded message.
+        sent: its kind and its message.
         run: that it must be of.
         provider: that it must come from.
 
     Raises:
-        ProtocolError: it is not such a message, of another run or provider, or its sizes do not fit.
+        ProtocolError: there is no such kind, the message is not one of it, of another run or provider, or its
+            sizes do not fit.
     """
-    what = f'frame from "{provider}": expected a FlowFrame of this run'
-    try:
-        message = MESSAGES["FlowFrame"].FromString(payload)
-    except DecodeError as error:
-        raise ProtocolError(f"{what}; got {error}") from error
+    if sent.kind not in KINDS:
+        raise ProtocolError(f'frame from "{provider}": expected one of {", ".join(KINDS)}; got {sent.kind}')
+    what = f'frame from "{provider}": expected a {KINDS[sent.kind].MESSAGE} of this run'
+    message = _parsed(sent, what)
     if (message.run, message.provider) != (run, provider):
         raise ProtocolError(f'{what}; got one of run {message.run} from "{message.provider}"')
-    arrays = {name: _array(message, name, inner, what) for name, inner in COMPONENTS.items()}
-    origin = (message.origin_x, message.origin_y)
-    return message.number, FlowFrame(message.step, message.time_ns, origin, message.cell, **arrays)
+    return message.number, _frame(sent.kind, message, what)
 
 
-def _array(message: Any, name: str, inner: tuple[int, ...], what: str) -> Single:
-    shape, data = (message.rows, message.columns, *inner), getattr(message, name)
-    expected = SINGLE.itemsize * int(np.prod(shape, dtype=np.int64))
-    if len(data) != expected:
+def logged_wake(payload: bytes) -> WakeFrame:
+    """Return the frame of a message WakeFrame without a sender.
+
+    Raises:
+        ProtocolError: it is none, or its sizes do not fit.
+    """
+    what = "expected a WakeFrame"
+    frame = _frame(WakeFrame.KIND, _parsed(Sent(WakeFrame.KIND, payload), what), what)
+    assert isinstance(frame, WakeFrame)
+    return frame
+
+
+def _parsed(sent: Sent, what: str) -> Any:
+    try:
+        return MESSAGES[KINDS[sent.kind].MESSAGE].FromString(sent.payload)
+    except DecodeError as error:
+        raise ProtocolError(f"{what}; got {error}") from error
+
+
+def _frame(kind: str, message: Any, what: str) -> Frame:
+    shapes = KINDS[kind].shapes(message)
+    frame = KINDS[kind].of(message, {name: _array(message, name, shapes[name], what) for name in shapes})
+    if isinstance(frame, WakeFrame) and frame.bound > message.rows:
+        raise ProtocolError(f"{what}: bound: expected at most {message.rows} rows; got {frame.bound}")
+    return frame
+
+
+def _array(message: Any, name: str, shape: tuple[int, ...], what: str) -> Single:
+    data = getattr(message, name)
+    expected = SINGLE.itemsize * int(np.prod(shape, dtype=object))
+    if not expected or len(data) != expected:
         raise ProtocolError(f"{what}: {name}: expected {expected} bytes for {shape}; got {len(data)}")
     return np.frombuffer(data, SINGLE).reshape(shape)
+
+
+def _with_arrays(message: Any, frame: Frame, provider: str) -> bytes:
+    """Return the bytes of a message, and the arrays of its frame behind them."""
+    parts = [message.SerializeToString()]
+    for name, shape in frame.shapes(message).items():
+        array = getattr(frame, name)
+        if array.shape != shape:
+            raise ProtocolError(f'"{provider}": frame: {name}: expected {shape}; got {array.shape}')
+        data = np.ascontiguousarray(array, SINGLE).tobytes()
+        parts += [preamble(message.DESCRIPTOR.fields_by_name[name].number, len(data)), data]
+    return b"".join(parts)

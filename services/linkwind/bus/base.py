@@ -1,9 +1,9 @@
 """What a transport has to offer: the two ends of the bus.
 
 A transport moves ``(key, bytes)`` and tells who is there; it knows no message but Fault. Keys are
-``linkwind/v1/<run>/motion``, ``…/wrench/<provider>``, ``…/observe/flow/<provider>``,
-``…/observe/checkpoint/<provider>``, ``…/control/<provider>``, ``…/refusal``, ``…/fault`` and
-``…/alive/<participant>``, and for listeners ``…/scenario`` and ``…/log/**``.
+``linkwind/v1/<run>/motion``, ``…/wrench/<provider>``, ``…/observe/<kind>/<provider>`` with the kind of a frame
+or ``checkpoint``, ``…/control/<provider>``, ``…/refusal``, ``…/fault`` and ``…/alive/<participant>``, and for
+listeners ``…/scenario`` and ``…/log/**``.
 """
 
 from __future__ import annotations
@@ -11,7 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
+from linkwind.frames import Sent
+
 PREFIX = "linkwind/v1"
+CHECKPOINT = "checkpoint"  # what is observed of a provider, beside its frames
 
 
 class LogStream(Protocol):
@@ -76,7 +79,7 @@ class DynamicsLink(Protocol):
         """
         ...
 
-    def frames(self) -> list[tuple[str, bytes]]:
+    def frames(self) -> list[tuple[str, Sent]]:
         """Take the frames that have come, each with its provider, without waiting.
 
         A frame that was sent before a wrench, or before a Bye, is there when that is.
@@ -130,7 +133,7 @@ class ProviderLink(Protocol):
         """
         ...
 
-    def show(self, frame: bytes) -> None:
+    def show(self, frame: Sent) -> None:
         """Send a frame to the dynamics."""
         ...
 

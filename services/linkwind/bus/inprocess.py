@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 
 from linkwind.errors import FaultError, LinkwindError
+from linkwind.frames import Sent
 from linkwind.protocol import DynamicsSession, ProviderSession, fault_error
 
 
@@ -25,7 +26,7 @@ class InProcessLink:
         self._session = session
         self.providers = list(providers)
         self._answers: deque[tuple[str, bytes]] = deque()
-        self._frames: list[tuple[str, bytes]] = []
+        self._frames: list[tuple[str, Sent]] = []
         self._checkpoints: list[tuple[str, bytes]] = []
         self._trouble: FaultError | None = None
         try:
@@ -72,7 +73,7 @@ class InProcessLink:
             raise self._trouble
         return self._answers.popleft()
 
-    def frames(self) -> list[tuple[str, bytes]]:
+    def frames(self) -> list[tuple[str, Sent]]:
         """Take the frames of the last answers."""
         taken, self._frames = self._frames, []
         return taken

@@ -129,8 +129,8 @@ class Exchanges:
             checkpoint = self._session.checkpoint(provider, payload)
             if checkpoint is not None:
                 self._log.checkpoint(provider, payload, checkpoint.time_ns)
-        for provider, payload in sorted(self._link.frames(), key=lambda sent: sent[0]):
-            frame = self._session.frame(provider, payload)
+        for provider, sent in sorted(self._link.frames(), key=lambda shown: shown[0]):
+            frame = self._session.frame(provider, sent)
             if frame is not None:
                 self._log.frame(provider, frame)
 

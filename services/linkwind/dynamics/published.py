@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from types import TracebackType
 
 from linkwind.bus.base import LogStream
-from linkwind.frames import FlowFrame
+from linkwind.frames import Frame
 from linkwind.listening import ending
 from linkwind.log.contents import (
     CHECKPOINT,
     DIAGNOSTICS,
     END,
-    FLOW,
+    FRAMES,
     MOTION,
     RETURNS,
     STATE,
@@ -21,12 +21,13 @@ from linkwind.log.contents import (
     TIMING,
     WRENCH,
 )
+from linkwind.log.frames import topic_of
 from linkwind.log.writer import LogWriter
 
 
 def topics(providers: Sequence[str]) -> list[str]:
     """Return every topic that a run may have messages of."""
-    kinds = (WRENCH, FLOW, CHECKPOINT)
+    kinds = (WRENCH, *FRAMES, CHECKPOINT)
     return [MOTION, STATE, STEP, TIMING, *(kind + name for name in providers for kind in kinds)]
 
 
@@ -66,9 +67,9 @@ class PublishedLog:
         self._log.checkpoint(provider, payload, time_ns)
         self.publish(CHECKPOINT + provider, payload, time_ns)
 
-    def frame(self, provider: str, frame: FlowFrame) -> None:
+    def frame(self, provider: str, frame: Frame) -> None:
         self._log.frame(provider, frame)
-        topic = FLOW + provider
+        topic = topic_of(frame, provider)
         wanted = self._stream.wants(topic)
         payload = frame.encode(self._run, provider, self._numbers[topic] + 1) if wanted else b""
         self.publish(topic, payload, frame.time_ns)

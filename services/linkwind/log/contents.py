@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import zlib
+from collections.abc import Iterable
 
 LOG = "log.mcap"  # in the folder of a run
 PROFILE = "linkwind"  # of the MCAP header
@@ -15,9 +16,11 @@ PACKAGE = "linkwind.v1."
 
 MOTION, STATE, STEP, TIMING = "/motion", "/state", "/step", "/timing"
 WRENCH = "/wrench/"  # and the name of the provider
-FLOW = "/flow/"  # and the name of the provider: foxglove.Grid
+FLOW, WAKE = "/flow/", "/wake/"  # frames, and the name of the provider: foxglove.Grid; WakeFrame, no sender
+FRAMES = (FLOW, WAKE)
 CHECKPOINT = "/checkpoint/"  # and the name of the provider
 TRANSFORMS, SCENE = "/tf", "/scene"  # pictures for Foxglove, decimated
+WAKE_SCENE = "/scene/wake/"  # and the name of the provider: its wakes, for Foxglove
 
 MESSAGE_OF = {MOTION: "MotionStep", STATE: "State", STEP: "Step", TIMING: "Timing"}
 
@@ -37,9 +40,14 @@ RECORD = "recorded_log"  # the file that the other side comes from
 DYNAMICS = "dynamics"
 
 
+def providers(kind: str, topics: Iterable[str]) -> tuple[str, ...]:
+    """Return the providers that have a topic of a kind such as ``FLOW``, in the order of the topics."""
+    return tuple(topic.removeprefix(kind) for topic in topics if topic.startswith(kind))
+
+
 def message_name(topic: str) -> str | None:
     """Return the name of the message that a topic carries, None for a topic that is not linkwind's."""
-    for start, name in ((WRENCH, "WrenchStep"), (CHECKPOINT, "Checkpoint")):
+    for start, name in ((WRENCH, "WrenchStep"), (WAKE, "WakeFrame"), (CHECKPOINT, "Checkpoint")):
         if topic.startswith(start):
             return name
     return MESSAGE_OF.get(topic)

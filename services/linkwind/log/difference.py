@@ -12,8 +12,8 @@ from google.protobuf.descriptor import FieldDescriptor
 from google.protobuf.message import DecodeError
 
 from linkwind.errors import LogError
-from linkwind.frames import COMPONENTS
-from linkwind.log import contents, grid
+from linkwind.log import contents, frames
+from linkwind.log.chunks import SchemaInfo
 from linkwind.schema import MESSAGES
 
 Value = float | int | str | None
@@ -148,19 +148,20 @@ def between_frames(topic: str, step_ns: int, recorded: bytes, again: bytes) -> D
     Args:
         topic: that both belong to.
         step_ns: communication step size [ns].
-        recorded: ``foxglove.Grid`` of the log.
+        recorded: message of the log.
         again: of the run made again.
     """
     from foxglove.messages import Grid
 
-    kind = Grid.get_schema()
-    right = grid.decode(again, kind.name, kind.data, step_ns)
+    of_grids = Grid.get_schema()
+    kind = SchemaInfo(of_grids.name, of_grids.encoding, of_grids.data)
+    right = frames.decode(topic, kind, again, step_ns)
     at = (topic, right.step, right.time_ns, 0)
     try:
-        left = grid.decode(recorded, kind.name, kind.data, step_ns)
+        left = frames.decode(topic, kind, recorded, step_ns)
     except LogError as error:
         return Difference(*at, "encoding", None, None, str(error), "a frame", None)
-    for field in ("origin", "cell", *COMPONENTS):
+    for field in (*right.PLACE, *right.ARRAYS):
         one, other = (np.ascontiguousarray(getattr(frame, field)) for frame in (left, right))
         if one.shape != other.shape:
             return Difference(*at, field, None, None, str(one.shape), str(other.shape), None)
@@ -169,7 +170,7 @@ def between_frames(topic: str, step_ns: int, recorded: bytes, again: bytes) -> D
         if differing.size:
             i = int(differing[0])
             values = one.flat[i].item(), other.flat[i].item()
-            distance = ulp(*values) if one.itemsize == 8 else single_ulp(*(int(side[i]) for side in bits))
+            distance = single_ulp(*(int(side[i]) for side in bits)) if one.itemsize == 4 else ulp(*values)
             return Difference(*at, field, i if one.ndim else None, None, *values, distance)
     lengths = (f"{len(recorded)} bytes", f"{len(again)} bytes")
     return Difference(*at, "encoding", None, None, *lengths, None)

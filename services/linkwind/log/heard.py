@@ -13,14 +13,16 @@ from typing import IO, Any
 
 from foxglove.messages import FrameTransforms, Grid, SceneUpdate
 
-from linkwind import frames, schema
+from linkwind import schema
 from linkwind.errors import MissedError
+from linkwind.frames import Sent, decode
 from linkwind.interrupt import uninterrupted
 from linkwind.listening import Described, Ended
-from linkwind.log import contents, grid
+from linkwind.log import contents, frames
 from linkwind.log.chunks import SchemaInfo
 from linkwind.log.copies import CopyWriter
 from linkwind.log.scene import Scene
+from linkwind.log.wakes import picture
 from linkwind.schema import MESSAGES
 from linkwind.spatial import Motion
 from linkwind.wire import FixedLayout
@@ -65,16 +67,22 @@ class HeardLog:
         self._missing(topic, number - 1)
         self._last[topic] = number
         self._taken[topic] += 1
-        if topic.startswith(contents.FLOW):
-            provider = topic.removeprefix(contents.FLOW)
-            payload = grid.encode(frames.decode(payload, self._about.run, provider)[1])
+        if topic.startswith(contents.FRAMES):
+            _, kind, provider = topic.split("/", 2)
+            payload = frames.encode(decode(Sent(kind, payload), self._about.run, provider)[1])
         self._copy.message(self._channel(topic), number, time_ns, payload)
         if topic == contents.STATE:
             self._pictures.take(number, time_ns, payload)
         elif topic == contents.STEP:  # a run draws a point when that is written
-            for shown, drawn_ns, picture in self._pictures.due():
-                self._last[shown] += 1
-                self._copy.message(self._channel(shown), self._last[shown], drawn_ns, picture)
+            for drawn in self._pictures.due():
+                self._draw(*drawn)
+        elif topic.startswith(contents.WAKE):
+            self._draw(contents.WAKE_SCENE + topic.removeprefix(contents.WAKE), time_ns, picture(payload))
+
+    def _draw(self, topic: str, time_ns: int, drawn: bytes) -> None:
+        """Write a picture, which is of a topic that listeners do not get."""
+        self._last[topic] += 1
+        self._copy.message(self._channel(topic), self._last[topic], time_ns, drawn)
 
     def _missing(self, topic: str, last: int) -> None:
         """Note that messages behind the last one up to number ``last`` did not come."""
@@ -156,6 +164,6 @@ def _schema(topic: str) -> SchemaInfo:
     name = contents.message_name(topic)
     if name is not None:
         return SchemaInfo(contents.PACKAGE + name, "protobuf", schema.DESCRIPTOR_SET)
-    kind: Any = PICTURES.get(topic, Grid)
+    kind: Any = SceneUpdate if topic.startswith(contents.WAKE_SCENE) else PICTURES.get(topic, Grid)
     found = kind.get_schema()
     return SchemaInfo(found.name, found.encoding, found.data)

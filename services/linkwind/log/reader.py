@@ -20,8 +20,8 @@ from typing import Any
 from google.protobuf.message import DecodeError
 
 from linkwind.errors import LogError
-from linkwind.frames import FlowFrame
-from linkwind.log import contents, grid, tables
+from linkwind.frames import FlowFrame, Frame, WakeFrame
+from linkwind.log import contents, frames, tables
 from linkwind.log.chunks import ChannelInfo, Data, Message, Span, chunk_records, latest, messages_of
 from linkwind.log.facts import Damage, DecodedMessage, LogInfo, RawMessage
 from linkwind.log.head import Head, check_magic
@@ -151,9 +151,13 @@ class Log(Head):
 
     @property
     def flows(self) -> tuple[str, ...]:
-        """Providers of whose fluid there are frames."""
-        topics = (topic for topic in self.topics if topic.startswith(contents.FLOW))
-        return tuple(topic.removeprefix(contents.FLOW) for topic in topics)
+        """Providers of whose fluid there are frames on a grid."""
+        return contents.providers(contents.FLOW, self.topics)
+
+    @property
+    def wakes(self) -> tuple[str, ...]:
+        """Providers of whose wings and wakes there are frames."""
+        return contents.providers(contents.WAKE, self.topics)
 
     def frames(self, provider: str) -> Iterator[FlowFrame]:
         """Iterate over the frames of a provider's fluid, in order; one chunk of the file is in memory.
@@ -161,20 +165,29 @@ class Log(Head):
         Raises:
             LogError: a message is no such frame.
         """
-        for channel, _, _, payload in self.messages(contents.FLOW + provider):
+        return (f for f in self.shown(contents.FLOW + provider) if isinstance(f, FlowFrame))
+
+    def wake_frames(self, provider: str) -> Iterator[WakeFrame]:
+        """Iterate like :meth:`frames` over a provider's wings with their wakes."""
+        return (f for f in self.shown(contents.WAKE + provider) if isinstance(f, WakeFrame))
+
+    def shown(self, topic: str) -> Iterator[Frame]:
+        """Iterate like :meth:`frames` over the frames of a topic, of either kind."""
+        for channel, _, _, payload in self.messages(topic):
             yield self._frame(channel, payload)
 
     def as_sent(self, channel: int, number: int, payload: bytes) -> bytes:
         """Return a message of :meth:`messages` as it was on the bus; a frame is logged in another form."""
         topic = self.channels[channel].topic
-        if not topic.startswith(contents.FLOW):
+        if not topic.startswith(contents.FRAMES):
             return payload
-        return self._frame(channel, payload).encode(self.run, topic.removeprefix(contents.FLOW), number)
+        provider = topic.split("/", 2)[2]
+        return self._frame(channel, payload).encode(self.run, provider, number)
 
-    def _frame(self, channel: int, payload: bytes) -> FlowFrame:
+    def _frame(self, channel: int, payload: bytes) -> Frame:
         topic, schema, _ = self.channels[channel]
         try:
-            return grid.decode(payload, schema.name, schema.data, self._step_ns)
+            return frames.decode(topic, schema, payload, self._step_ns)
         except LogError as error:
             raise LogError(f"{self.path}: {topic}: {error}.") from error
 

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from linkwind.errors import LogError
-from linkwind.frames import FlowFrame
-from linkwind.log import contents, grid
+from linkwind.frames import FlowFrame, Frame, WakeFrame
+from linkwind.log import contents, frames
 from linkwind.log.chunks import MESSAGE, messages_of
 from linkwind.log.head import Head, check_magic
 from linkwind.log.index import ChunkAt, Index, Times
@@ -58,9 +58,17 @@ class SeekableLog(Head):
 
     @property
     def flows(self) -> tuple[str, ...]:
-        """Providers of whose fluid there are frames."""
+        """Providers of whose fluid there are frames on a grid."""
+        return self._providers(contents.FLOW)
+
+    @property
+    def wakes(self) -> tuple[str, ...]:
+        """Providers of whose wings and wakes there are frames."""
+        return self._providers(contents.WAKE)
+
+    def _providers(self, kind: str) -> tuple[str, ...]:
         topics = (channel.topic for channel in self._index.channels.values())
-        return tuple(sorted(t.removeprefix(contents.FLOW) for t in topics if t.startswith(contents.FLOW)))
+        return tuple(sorted(contents.providers(kind, topics)))
 
     def extent(self, topic: str) -> tuple[int, int] | None:
         """Return the first and the last time of a topic's messages [ns]; None without any."""
@@ -131,13 +139,21 @@ class SeekableLog(Head):
         Raises:
             LogError: the message is no such frame.
         """
-        topic = contents.FLOW + provider
+        found = self._shown(contents.FLOW + provider, time_ns, step_ns)
+        return found if isinstance(found, FlowFrame) else None
+
+    def wake_frame(self, provider: str, time_ns: int, step_ns: int) -> WakeFrame | None:
+        """Return a provider's wings and wakes at a time [ns], like :meth:`frame`."""
+        found = self._shown(contents.WAKE + provider, time_ns, step_ns)
+        return found if isinstance(found, WakeFrame) else None
+
+    def _shown(self, topic: str, time_ns: int, step_ns: int) -> Frame | None:
         number, payload = self._number(topic), self.at(topic, time_ns)
         if number is None or payload is None:
             return None
         _, schema, _ = self._index.channels[number]
         try:
-            return grid.decode(payload, schema.name, schema.data, step_ns)
+            return frames.decode(topic, schema, payload, step_ns)
         except LogError as error:
             raise LogError(f"{self.path}: {topic}: {error}.") from error
 

@@ -19,15 +19,16 @@ from typing import Any
 from foxglove import Channel, Context, Schema, open_mcap
 from foxglove.channels import FrameTransformsChannel, SceneUpdateChannel
 from foxglove.mcap import MCAPWriteOptions
-from foxglove.messages import Grid
+from foxglove.messages import Grid, SceneUpdate
 
 from linkwind import schema
 from linkwind.errors import LogError
-from linkwind.frames import FlowFrame
-from linkwind.log import contents, grid
+from linkwind.frames import Frame
+from linkwind.log import contents, frames
 from linkwind.log.scene import Scene
 from linkwind.log.sink import Sink
 from linkwind.log.versions import versions
+from linkwind.log.wakes import picture
 from linkwind.spatial import Array, Motion
 
 _log = logging.getLogger("linkwind")
@@ -190,20 +191,25 @@ class LogWriter:
             self._transforms.log(self._scene.transforms(time_ns, motion), log_time=time_ns)
             self._scenes.log(self._scene.update(time_ns, motion, force), log_time=time_ns)
 
-    def frame(self, provider: str, frame: FlowFrame) -> None:
+    def frame(self, provider: str, frame: Frame) -> None:
         """Log a frame of the fluid that ``provider`` showed, at the frame's own time."""
-        self.copy(contents.FLOW + provider, grid.encode(frame), frame.time_ns)
+        self.copy(frames.topic_of(frame, provider), frames.encode(frame), frame.time_ns)
 
     def checkpoint(self, provider: str, payload: bytes, time_ns: int) -> None:
         """Log an encoded Checkpoint of ``provider``, at the checkpoint's own time."""
         self.copy(contents.CHECKPOINT + provider, payload, time_ns)
 
     def copy(self, topic: str, payload: bytes, time_ns: int) -> None:
-        """Log a timing, a frame or a checkpoint as another log has it."""
+        """Log a timing, a frame or a checkpoint as another log has it; of a wake a picture with it."""
         if topic not in self._rare:
             kind = Grid.get_schema() if topic.startswith(contents.FLOW) else None
             self._rare[topic] = self._channel(topic, kind)
         self._rare[topic](payload, time_ns)
+        if topic.startswith(contents.WAKE):
+            shown = contents.WAKE_SCENE + topic.removeprefix(contents.WAKE)
+            if shown not in self._rare:
+                self._rare[shown] = self._channel(shown, SceneUpdate.get_schema())
+            self._rare[shown](picture(payload), time_ns)
 
     def diagnostics(self, names: Mapping[str, Sequence[str]]) -> None:
         """Record the names of the numbers that providers report with their wrenches; none, nothing."""

@@ -9,7 +9,7 @@ import numpy as np
 from linkwind import checkpoints, frames
 from linkwind.checkpoints import Checkpoint
 from linkwind.errors import ProtocolError, SimulationError
-from linkwind.frames import FlowFrame
+from linkwind.frames import Frame, Sent
 from linkwind.messages import MotionMessage
 from linkwind.protocol.handshake import HandShake, Participant
 from linkwind.spatial import Array
@@ -121,14 +121,14 @@ class DynamicsSession(HandShake):
         self._waiting -= 1
         return True
 
-    def frame(self, provider: str, payload: bytes) -> FlowFrame | None:
+    def frame(self, provider: str, sent: Sent) -> Frame | None:
         """Take a frame; None if a provider that came back has sent it again.
 
         Raises:
             ProtocolError: unknown provider, not a frame of this run, or one before it was lost.
         """
         known = self._sender(provider, "frame")
-        number, frame = frames.decode(payload, self.run, provider)
+        number, frame = frames.decode(sent, self.run, provider)
         if known.losses and number <= known.frames:
             return None
         self._check_number("frame", provider, known.frames + 1, number)

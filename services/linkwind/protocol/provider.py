@@ -11,7 +11,7 @@ from typing import Any
 
 from linkwind import __version__
 from linkwind.errors import ProtocolError, RefusedError
-from linkwind.frames import FlowFrame
+from linkwind.frames import Frame, Sent
 from linkwind.messages import KINDS, MotionMessage, WrenchMessage
 from linkwind.protocol.control import Control, fault, parse
 from linkwind.protocol.memory import Memory, Model
@@ -50,7 +50,7 @@ class ProviderSession:
         self.at = (-1, 0)
         self._build = build
         self._memory: Memory | None = None
-        self._frames: list[bytes] = []
+        self._frames: list[Sent] = []
         self._shown = 0
         self._taken = 0
         self._answer = b""
@@ -120,7 +120,7 @@ class ProviderSession:
 
     def _use(self, model: Model) -> None:
         self._model = model
-        self._frame: Callable[[], FlowFrame | None] = getattr(model, "frame", lambda: None)
+        self._frame: Callable[[], Frame | None] = getattr(model, "frame", lambda: None)
 
     @property
     def model(self) -> Any:
@@ -198,9 +198,9 @@ class ProviderSession:
             )
         self._shown += 1
         if self._shown > self._taken:
-            self._frames.append(frame.encode(self.run, self.name, self._shown))
+            self._frames.append(Sent(frame.KIND, frame.encode(self.run, self.name, self._shown)))
 
-    def frames(self) -> list[bytes]:
+    def frames(self) -> list[Sent]:
         """Take what the last :meth:`answer` has to show besides: to be sent before the answer itself."""
         taken, self._frames = self._frames, []
         return taken

@@ -15,7 +15,7 @@ HOW = r"bus\..*|log\..*|coupling\.timeout|description|providers\.\d+\.(flow|vort
 # Settings that may change from a communication point on; what bodies and providers remember stays right.
 PHYSICS = (
     r"time\.end|environment\..*|joints\.\d+\.(stiffness|damping|rest).*|dynamics\.(integrator|substeps|rtol|atol)"
-    r"|forces\.\d+\.inputs\..*|providers\.\d+\.(plate|field)\..*|providers\.\d+\.flow\.frames"
+    r"|forces\.\d+\.inputs\..*|providers\.\d+\.(plate|field)\..*|providers\.\d+\.(flow|vortex)\.frames"
 )
 REMEMBERED = r"environment\.(wind|density|viscosity|gusts).*"  # by a flow: its lattice has them in its state
 MAY_CHANGE = (

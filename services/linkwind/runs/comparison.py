@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from linkwind.frames import FlowFrame
-from linkwind.log import grid
-from linkwind.log.contents import FLOW, MOTION, STATE, STEP, WRENCH
+from linkwind.frames import Frame
+from linkwind.log.contents import FRAMES, MOTION, STATE, STEP, WRENCH
 from linkwind.log.difference import Difference, Finder, between_frames
+from linkwind.log.frames import encode, topic_of
 from linkwind.log.reader import Log
 from linkwind.mechanism import Mechanism
 from linkwind.native.march import Recording
@@ -21,7 +21,7 @@ class Comparison:
 
     def __init__(self, log: Log, scenario: Scenario, mechanism: Mechanism, *, wrenches: bool) -> None:
         providers = [provider.name for provider in scenario.providers] if wrenches else []
-        topics = [MOTION, *(kind + name for kind in (FLOW, WRENCH) for name in providers), STATE, STEP]
+        topics = [MOTION, *(kind + name for kind in (*FRAMES, WRENCH) for name in providers), STATE, STEP]
         self._recorded = {topic: Recorded(log, topic) for topic in topics}
         self._complete = log.complete
         self._step_ns = scenario.coupling.step_ns
@@ -50,9 +50,9 @@ class Comparison:
     def scene(self, time_ns: int, motion: Motion, force: Array) -> None:
         """Pictures follow from the states."""
 
-    def frame(self, provider: str, frame: FlowFrame) -> None:
+    def frame(self, provider: str, frame: Frame) -> None:
         if provider in self._wrenches:
-            self._compare(FLOW + provider, grid.encode(frame), frame.time_ns)
+            self._compare(topic_of(frame, provider), encode(frame), frame.time_ns)
 
     def checkpoint(self, provider: str, payload: bytes, time_ns: int) -> None:
         """What a model remembers is its own; what follows from it is compared."""
@@ -85,7 +85,7 @@ class Comparison:
             return False
         _, _, recorded_ns, recorded = found
         if recorded != payload:
-            if topic.startswith(FLOW):
+            if topic.startswith(FRAMES):
                 raise DifferError(between_frames(topic, self._step_ns, recorded, payload))
             raise DifferError(self._finder.between(topic, time_ns, recorded, payload))
         if recorded_ns != time_ns:

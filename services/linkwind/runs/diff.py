@@ -13,7 +13,7 @@ import numpy as np
 
 from linkwind.errors import LogError
 from linkwind.log.compare import FieldDifference, Matched, deviation, differences, match
-from linkwind.log.contents import MOTION, STATE, STEP, WRENCH
+from linkwind.log.contents import FRAMES, MOTION, STATE, STEP, WRENCH
 from linkwind.log.difference import Difference, printable
 from linkwind.log.reader import Log, open_log
 from linkwind.log.scenarios import recorded
@@ -123,8 +123,8 @@ def diff(one: Path, other: Path, *, rtol: float = 0.0) -> Compared:
         )
     ]
     if same_step:
-        for provider in _flows(*logs):
-            fields += frame_differences(*logs, provider, rtol)
+        for topic in _shown(*logs):
+            fields += frame_differences(*logs, topic, rtol)
     states = matched.get(STATE)
     if states is None or not len(states.time_ns):
         raise LogError(f"{other}: expected a time in common with {one}; got none. Compare runs that overlap.")
@@ -136,9 +136,9 @@ def diff(one: Path, other: Path, *, rtol: float = 0.0) -> Compared:
     return Compared(first, tuple(fields), growth, curves, len(states.time_ns), tuple(remarks))
 
 
-def _flows(one: Log, other: Log) -> list[str]:
-    """Return the providers of whose fluid both logs have frames."""
-    return sorted({*one.flows} & {*other.flows})
+def _shown(one: Log, other: Log) -> list[str]:
+    """Return the topics of frames that both logs have."""
+    return sorted(topic for topic in {*one.topics} & {*other.topics} if topic.startswith(FRAMES))
 
 
 def _refuse_other_bodies(one: Log, other: Log) -> None:

@@ -9,13 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from linkwind.frames import COMPONENTS, FlowFrame
+from linkwind.frames import FlowFrame, Frame, WakeFrame
 from linkwind.log.compare import FieldDifference, deviation, largest
-from linkwind.log.contents import FLOW
 from linkwind.log.difference import Difference, single_ulp
 from linkwind.log.reader import Log
 
-GRID = "grid"  # in the place of a field, where the cells of two frames are not the same
+GRID = "grid"  # in the place of a field, where the cells, or the rings, of two frames are not the same
 
 
 @dataclass
@@ -28,25 +27,23 @@ class _Found:
     frames: int
 
 
-def frame_differences(one: Log, other: Log, provider: str, rtol: float) -> list[FieldDifference]:
+def frame_differences(one: Log, other: Log, topic: str, rtol: float) -> list[FieldDifference]:
     """Return what differs by more than ``rtol`` times the largest value of a field.
 
     Args:
         one: a log.
         other: another one.
-        provider: of whose fluid both have frames.
+        topic: of frames that both have.
         rtol: 0 for every bit.
     """
-    topic = FLOW + provider
-    scales = _scales(one, other, provider)
+    scales = _scales(one, other, topic)
     found: dict[str, _Found] = {}
-    for left, right in _pairs(one, other, provider):
-        if (left.shape, left.origin, left.cell) != (right.shape, right.origin, right.cell):
-            if not _same_cells(left, right, rtol):
-                _note(found, topic, GRID, left, (None, str(left.extent), str(right.extent), None), math.inf)
-            if left.shape != right.shape:
-                continue
-        for field in COMPONENTS:
+    for left, right in _pairs(one, other, topic):
+        if not _same_cells(left, right, rtol):
+            _note(found, topic, GRID, left, (None, _where(left), _where(right), None), math.inf)
+        if left.shape != right.shape:
+            continue
+        for field in left.ARRAYS:
             worst = _worst(getattr(left, field), getattr(right, field), rtol * scales[field], rtol)
             if worst is not None:
                 _note(found, topic, field, left, worst[0], worst[1])
@@ -59,9 +56,9 @@ def frame_differences(one: Log, other: Log, provider: str, rtol: float) -> list[
     ]  # fmt: skip
 
 
-def _pairs(one: Log, other: Log, provider: str) -> Iterator[tuple[FlowFrame, FlowFrame]]:
+def _pairs(one: Log, other: Log, topic: str) -> Iterator[tuple[Frame, Frame]]:
     """Yield the frames that both logs have of the same time."""
-    mine, theirs = one.frames(provider), other.frames(provider)
+    mine, theirs = one.shown(topic), other.shown(topic)
     left, right = next(mine, None), next(theirs, None)
     while left is not None and right is not None:
         if left.time_ns == right.time_ns:
@@ -71,21 +68,29 @@ def _pairs(one: Log, other: Log, provider: str) -> Iterator[tuple[FlowFrame, Flo
         right = next(theirs, None) if step_right else right
 
 
-def _scales(one: Log, other: Log, provider: str) -> dict[str, float]:
-    scales = dict.fromkeys(COMPONENTS, 0.0)
+def _scales(one: Log, other: Log, topic: str) -> dict[str, float]:
+    scales: dict[str, float] = {}
     for log in (one, other):
-        for frame in log.frames(provider):
-            for field in COMPONENTS:
-                scales[field] = max(scales[field], largest(getattr(frame, field)))
+        for frame in log.shown(topic):
+            for field in frame.ARRAYS:
+                scales[field] = max(scales.get(field, 0.0), largest(getattr(frame, field)))
     return scales
 
 
-def _same_cells(left: FlowFrame, right: FlowFrame, rtol: float) -> bool:
-    """Tell whether two grids are the same but for ``rtol`` of a cell's side."""
+def _same_cells(left: Frame, right: Frame, rtol: float) -> bool:
+    """Tell whether two grids are the same but for ``rtol`` of a cell's side, or as many rings."""
     if left.shape != right.shape:
         return False
+    if isinstance(left, WakeFrame) or isinstance(right, WakeFrame):
+        return getattr(left, "bound", None) == getattr(right, "bound", None)
     off = np.abs(np.subtract(left.origin, right.origin)).max()
     return bool(max(off, abs(left.cell - right.cell)) <= rtol * left.cell)
+
+
+def _where(frame: Frame) -> str:
+    if isinstance(frame, FlowFrame):
+        return str(frame.extent)
+    return f"{frame.shape} rings, {frame.bound} rows of them on the wing"
 
 
 def _worst(one: Any, other: Any, limit: float, rtol: float) -> tuple[tuple[Any, ...], float] | None:
@@ -102,7 +107,7 @@ def _worst(one: Any, other: Any, limit: float, rtol: float) -> tuple[tuple[Any, 
 
 
 def _note(
-    found: dict[str, _Found], topic: str, field: str, frame: FlowFrame, place: tuple[Any, ...], size: float
+    found: dict[str, _Found], topic: str, field: str, frame: Frame, place: tuple[Any, ...], size: float
 ) -> None:
     t = frame.time_ns / 1e9
     if field not in found:

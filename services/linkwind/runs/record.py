@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from linkwind import checkpoints
 from linkwind.errors import LogError, ProtocolError
-from linkwind.log.contents import CHECKPOINT, FLOW, MOTION, TIMING, WRENCH
+from linkwind.log.contents import CHECKPOINT, FRAMES, MOTION, TIMING, WRENCH
 from linkwind.log.reader import Log
 
 
@@ -49,7 +49,7 @@ def exchanges(log: Log, step_ns: int) -> Iterator[Exchange]:
     in the file nothing counts.
     """
     providers = tuple(log.provider_bodies)
-    kinds = (WRENCH, FLOW, CHECKPOINT)
+    kinds = (WRENCH, *FRAMES, CHECKPOINT)
     topics = (MOTION, TIMING, *(kind + name for kind in kinds for name in providers))
     numbers: dict[int, int] = {}
     current: Exchange | None = None

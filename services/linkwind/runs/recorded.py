@@ -9,6 +9,7 @@ from itertools import islice
 from google.protobuf.message import DecodeError
 
 from linkwind.errors import LogError
+from linkwind.frames import Sent
 from linkwind.log.chunks import Message
 from linkwind.log.contents import WRENCH
 from linkwind.log.difference import Difference
@@ -155,7 +156,7 @@ class RecordedWrenches:
                 at = (WRENCH + name, motion.at[0], motion.time_ns, motion.at[1])
                 raise DifferError(Difference(*at, field, None, None, was, asked, None))
 
-    def frames(self) -> list[tuple[str, bytes]]:
+    def frames(self) -> list[tuple[str, Sent]]:
         """Nobody is there to show any."""
         return []
 

@@ -21,7 +21,7 @@ from linkwind.log.contents import (
     CHECKPOINT,
     DIAGNOSTICS,
     END,
-    FLOW,
+    FRAMES,
     MOTION,
     RUN,
     STATE,
@@ -243,7 +243,7 @@ def _sent(log: Log, messages: Sequence[Message]) -> list[Sent]:
 
 def as_exchanged(point: Sequence[Sent]) -> Iterator[Sent]:
     """Yield what participants sent, in their order: a provider's frames and checkpoints before its wrench."""
-    waiting = [sent for sent in point if sent.topic.startswith((FLOW, CHECKPOINT))]
+    waiting = [sent for sent in point if sent.topic.startswith((*FRAMES, CHECKPOINT))]
     waiting.sort(key=lambda sent: sent.topic.startswith(CHECKPOINT))
     for sent in point:
         if sent.topic.startswith(WRENCH):
@@ -257,7 +257,7 @@ def as_exchanged(point: Sequence[Sent]) -> Iterator[Sent]:
 
 def _key(topic: str) -> str:
     """Return the key of a topic below that of the run."""
-    return f"/observe{topic}" if topic.startswith((FLOW, CHECKPOINT)) else topic
+    return f"/observe{topic}" if topic.startswith((*FRAMES, CHECKPOINT)) else topic
 
 
 def _records(log: Log, *names: str) -> dict[str, dict[str, str]]:
@@ -291,7 +291,7 @@ def _topics(log: Log, selection: Selection) -> list[str]:
     """Return the topics to publish."""
     there = [MOTION]
     for name in log.provider_bodies:
-        there += [topic for kind in (FLOW, CHECKPOINT) if (topic := kind + name) in log.topics]
+        there += [topic for kind in (*FRAMES, CHECKPOINT) if (topic := kind + name) in log.topics]
         there.append(WRENCH + name)
     there += [topic for topic in (STATE, STEP, TIMING) if topic in log.topics]
     unknown = [topic for topic in selection.topics if topic not in there]

@@ -15,7 +15,7 @@ from google.protobuf.message import DecodeError
 from linkwind.bus.base import DynamicsLink
 from linkwind.dynamics.published import PublishedLog
 from linkwind.errors import MismatchError
-from linkwind.frames import FlowFrame
+from linkwind.frames import Frame
 from linkwind.log.contents import WRENCH
 from linkwind.log.difference import Difference, Finder
 from linkwind.log.writer import LogWriter
@@ -153,7 +153,7 @@ class ContinuedLog:
             if isinstance(self._log, PublishedLog):
                 self._log.publish(topic, sent(), shown_ns)
 
-    def frame(self, provider: str, frame: FlowFrame) -> None:
+    def frame(self, provider: str, frame: Frame) -> None:
         """Write a frame, unless it is in the record."""
         if self._record.current is None:
             self._log.frame(provider, frame)

@@ -148,6 +148,7 @@ class VortexModel(Section):
         description="Which edge of a plate sheds its wake, by body, in its frame; default: the downstream "
         "one at the start",
     )
+    frames: int = Field(default=48, ge=0, le=10000, description="Pictures of the wakes in the log of a run")
     threads: int = Field(
         default=1, ge=1, le=256, description="Threads that share the work; no bit depends on it"
     )

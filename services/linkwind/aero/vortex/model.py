@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import struct
 
 import numpy as np
 
@@ -11,12 +12,15 @@ from linkwind.aero.base import Capabilities, body_indices, item
 from linkwind.aero.vortex.surface import plates, surfaces, trailing
 from linkwind.aero.wind import wind_table
 from linkwind.errors import ProtocolError, SimulationError
+from linkwind.frames import Single, WakeFrame, logged_wake
 from linkwind.native.vortex import VortexLattice
 from linkwind.native.wind import wind_at
 from linkwind.scenario import Provider, Scenario
 from linkwind.spatial import Array, Motion, Wrench
 
 _log = logging.getLogger("linkwind")
+
+_MEMORY = struct.Struct("<dq")  # time of the last accepted state, bytes of the frame that is still to be shown
 
 
 class Vortex:
@@ -44,6 +48,9 @@ class Vortex:
         self._rows = np.array(body_indices(scenario, provider))
         self._wind = wind_table(scenario.environment)
         self._h = scenario.coupling.step_ns / 1e9
+        frames = provider.vortex.frames
+        self._every = max(1, round(scenario.steps / frames)) if frames else 0
+        self._due: WakeFrame | None = None
         self._lattice: VortexLattice | None = None
         self._sides = np.zeros(len(self._rows))
         self._evaluated, self._committed = math.nan, math.nan  # times of the last trial and accepted states
@@ -61,7 +68,11 @@ class Vortex:
         pose, twist = self._state(motion)
         if t != self._evaluated:  # as at the start, before the first question
             self._solve(t, motion, pose, twist)
-        self._made(t, motion).commit(t, pose, twist)
+        lattice, step = self._made(t, motion), round(t / self._h)
+        shown = self._every and step % self._every == 0
+        corner, strength = (part.astype(np.float32) for part in lattice.wake)  # as they are at t, before they go
+        lattice.commit(t, pose, twist)
+        self._due = self._frame(step, corner, strength) if shown else None
         self._committed = t
 
     def evaluate(self, t: float, motion: Motion, wrench: Wrench) -> None:
@@ -79,11 +90,18 @@ class Vortex:
         if wrench.diagnostics is not None:
             wrench.diagnostics[:] = (*self._incidence(t, motion), lattice.rows)
 
+    def frame(self) -> WakeFrame | None:
+        """Return wings and wakes at the last accepted state, if a picture of them is due."""
+        due, self._due = self._due, None
+        return due
+
     def save(self) -> bytes:
-        """Return wakes, strengths and trailing edges as committed; empty before the first motion."""
+        """Return wakes, strengths, trailing edges and the frame that is due, as committed; empty before that."""
         if self._lattice is None or math.isnan(self._committed):
             return b""
-        return np.array([self._committed, *self._sides], "<f8").tobytes() + self._lattice.save()
+        due = b"" if self._due is None else self._due.encode()
+        memory = _MEMORY.pack(self._committed, len(due)) + self._sides.astype("<f8").tobytes()
+        return memory + due + self._lattice.save()
 
     def restore(self, blob: bytes) -> None:
         """Take back what ``save`` returned.
@@ -92,18 +110,23 @@ class Vortex:
             ProtocolError: the blob is not one of these wings.
         """
         self._evaluated, self._committed = math.nan, math.nan
-        self._lattice = None
+        self._lattice, self._due = None, None
         if not blob:
             return
-        head = 8 * (1 + len(self._rows))
+        head = _MEMORY.size + 8 * len(self._rows)
         try:
             if len(blob) < head:
                 raise ValueError(f"{head} bytes and more; got {len(blob)}")
-            self._committed, *sides = np.frombuffer(blob[:head], "<f8").tolist()
-            if not set(sides) <= {-1.0, 1.0}:
-                raise ValueError(f"trailing edges at 1 or -1; got {sides}")
-            self._lay(np.array(sides)).restore(blob[head:])
-        except ValueError as error:
+            self._committed, size = _MEMORY.unpack_from(blob)
+            sides = np.frombuffer(blob[_MEMORY.size : head], "<f8")
+            if not set(sides.tolist()) <= {-1.0, 1.0}:
+                raise ValueError(f"trailing edges at 1 or -1; got {sides.tolist()}")
+            if not 0 <= size <= len(blob) - head:
+                raise ValueError(f"a frame of up to {len(blob) - head} bytes; got {size}")
+            due, lattice = blob[head : head + size], blob[head + size :]
+            self._lay(sides.copy()).restore(lattice)
+            self._due = logged_wake(due) if due and self._every else None
+        except (ValueError, ProtocolError) as error:
             raise ProtocolError(f"model vortex: expected a checkpoint of {error}.") from error
 
     @property
@@ -114,6 +137,17 @@ class Vortex:
         return self._lattice
 
     # ---- one step ----
+
+    def _frame(self, step: int, corner: Single, strength: Single) -> WakeFrame:
+        """Return the wings as they are and these wakes, shape (rows, n, s + 1, 3), (rows, n, s)."""
+        lattice, chordwise = self.lattice, self._provider.vortex.chordwise
+        return WakeFrame(
+            step=step,
+            time_ns=step * self._scenario.coupling.step_ns,
+            bound=chordwise,
+            corner=np.hstack([lattice.surface.astype(np.float32), np.swapaxes(corner, 0, 1)]),
+            strength=np.hstack([lattice.strength.astype(np.float32), np.swapaxes(strength, 0, 1)]),
+        )
 
     def _state(self, motion: Motion) -> tuple[Array, Array]:
         rows = self._rows

@@ -6,23 +6,24 @@ import os
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 import zenoh
 from zenoh.handlers import FifoChannel
 
-from linkwind.bus.base import PREFIX
+from linkwind.bus.base import CHECKPOINT, PREFIX
 from linkwind.bus.zenoh.access import of_hub
 from linkwind.bus.zenoh.endpoint import Endpoint
 from linkwind.bus.zenoh.session import DYNAMICS, LEASE, Security, key_segment
 from linkwind.bus.zenoh.stream import ZenohLogStream
 from linkwind.credentials import ROUTER, Identity
 from linkwind.errors import AnswerTimeoutError, LinkwindError, LostError
+from linkwind.frames import Sent
 
 # s that the dynamics looks for an answer before it sleeps: a processor that is awake answers two to four
 # times faster. Only one side may do so, and only if it does not take the other's processor away.
 SPIN = 200e-6 if len(os.sched_getaffinity(0)) > 1 else 0.0
-FRAMES = 64  # that may wait for the dynamics, which takes them at every exchange
+FRAMES = 64  # and checkpoints, that may wait for the dynamics, which takes them at every exchange
 PAUSE = 0.005  # s between two looks while providers come and go
 FIRST_RESEND = 0.5  # s; the first motion to a provider may be lost while declarations still travel
 
@@ -81,8 +82,9 @@ class ZenohDynamicsLink(Endpoint):
         self._resend_at: float | None = None
         self._asking = threading.Lock()
         # Before the wrenches' own: whoever can send a wrench can send a frame.
-        self._shown = self._session.declare_subscriber(f"{base}/observe/flow/*", FifoChannel(FRAMES))
-        self._kept = self._session.declare_subscriber(f"{base}/observe/checkpoint/*", FifoChannel(FRAMES))
+        self._observed = self._session.declare_subscriber(f"{base}/observe/*/*", FifoChannel(FRAMES))
+        self._frames: list[tuple[str, Sent]] = []
+        self._checkpoints: list[tuple[str, bytes]] = []
         self._join(f"{base}/wrench/*", f"{base}/motion", session.run, "dynamics")
         self._control = self._session.declare_queryable(f"{base}/control/*", self._on_control, complete=True)
         # After the other: whoever has seen this one has seen that, too, unless it may not.
@@ -173,29 +175,35 @@ class ZenohDynamicsLink(Endpoint):
             "Is it still computing? Raise coupling.timeout, or look at its output"
         )
 
-    def frames(self) -> list[tuple[str, bytes]]:
+    def frames(self) -> list[tuple[str, Sent]]:
         """Take the frames that have come; see :class:`~linkwind.bus.base.DynamicsLink`.
 
         One session sends frame and wrench over one link, with one priority: zenoh keeps their order.
         """
-        return _taken(self._shown)
+        self._observe()
+        taken, self._frames = self._frames, []
+        return taken
 
     def checkpoints(self) -> list[tuple[str, bytes]]:
         """Take the checkpoints that have come; see :meth:`frames`."""
-        return _taken(self._kept)
+        self._observe()
+        taken, self._checkpoints = self._checkpoints, []
+        return taken
+
+    def _observe(self) -> None:
+        """Take what has come, without waiting."""
+        while (sample := self._observed.try_recv()) is not None:
+            name, payload = _named(sample)
+            kind = str(sample.key_expr).rsplit("/", 2)[1]
+            if kind == CHECKPOINT:
+                self._checkpoints.append((name, payload))
+            else:
+                self._frames.append((name, Sent(kind, payload)))
 
 
 def largest_wrench(bodies: int) -> int:
     """Return what the wrench on so many bodies may need, every matrix included [bytes]."""
     return 2**16 + 8 * (6 * bodies + 36 * bodies + 36 * bodies**2)
-
-
-def _taken(subscriber: Any) -> list[tuple[str, bytes]]:
-    """Return what has come, each with its provider, without waiting."""
-    taken = []
-    while (sample := subscriber.try_recv()) is not None:
-        taken.append(_named(sample))
-    return taken
 
 
 def _named(sample: zenoh.Sample) -> tuple[str, bytes]:

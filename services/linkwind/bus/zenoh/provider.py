@@ -8,7 +8,7 @@ from typing import Any
 
 import zenoh
 
-from linkwind.bus.base import PREFIX
+from linkwind.bus.base import CHECKPOINT, PREFIX
 from linkwind.bus.zenoh.access import of_guest
 from linkwind.bus.zenoh.endpoint import Endpoint
 from linkwind.bus.zenoh.session import (
@@ -22,6 +22,7 @@ from linkwind.bus.zenoh.session import (
 )
 from linkwind.credentials import Identity
 from linkwind.errors import LostError, ParticipantError, SimulationError
+from linkwind.frames import KINDS, Sent
 
 ANSWER = 5.0  # s for the answer to a request: a Welcome may carry the memory of a large model
 
@@ -91,12 +92,12 @@ class ZenohProviderLink(Endpoint):
         self._run = key_segment(run, "--run")
         self._joined_at = time.monotonic()
         base, name = f"{PREFIX}/{run}", self._name
-        self._frames, self._checkpoints = (
-            self._session.declare_publisher(
+        self._observed = {
+            kind: self._session.declare_publisher(
                 f"{base}/observe/{kind}/{name}", congestion_control=zenoh.CongestionControl.BLOCK
             )
-            for kind in ("flow", "checkpoint")
-        )
+            for kind in (*KINDS, CHECKPOINT)
+        }
         self._join(f"{base}/motion", f"{base}/wrench/{name}", run, name)
 
     def _seen(self, name: str, present: bool) -> None:
@@ -118,9 +119,9 @@ class ZenohProviderLink(Endpoint):
             pass
         return sample.payload.to_bytes()
 
-    def show(self, frame: bytes) -> None:
+    def show(self, frame: Sent) -> None:
         """Send a frame to the dynamics."""
-        self._frames.put(frame)
+        self._observed[frame.kind].put(frame.payload)
 
     def keep(self, checkpoint: bytes) -> None:
         """Send a checkpoint to the dynamics.
@@ -133,7 +134,7 @@ class ZenohProviderLink(Endpoint):
                 f"checkpoint: expected at most {LARGEST / 1e6:.0f} MB; got {len(checkpoint) / 1e6:.0f} MB. "
                 "Use a smaller model, or log.checkpoint_every = 0 and bus.recovery = 0."
             )
-        self._checkpoints.put(checkpoint)
+        self._observed[CHECKPOINT].put(checkpoint)
 
     def reply(self, wrench: bytes) -> None:
         """Send a wrench message to the dynamics."""

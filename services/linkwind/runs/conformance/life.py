@@ -165,8 +165,8 @@ class Life:
         return answer
 
     def _take_shown(self) -> None:
-        for name, payload in self.link.frames():
-            self.session.frame(name, payload)
+        for name, sent in self.link.frames():
+            self.session.frame(name, sent)
         found = (self.session.checkpoint(name, payload) for name, payload in self.link.checkpoints())
         self.checkpoints += [checkpoint for checkpoint in found if checkpoint is not None]
 
