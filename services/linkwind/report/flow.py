@@ -59,7 +59,7 @@ def survey(provider: str, frames: Frames) -> Flow | None:
     stride = max(1, math.isqrt(count // SAMPLES))
     parts = [(speed(f)[::stride, ::stride], np.abs(f.vorticity[::stride, ::stride])) for f in frames()]
     tops = [
-        _top(np.concatenate([part.ravel() for part in each]), share)
+        round_top(np.concatenate([part.ravel() for part in each]), share)
         for each, share in zip(zip(*parts, strict=True), (SPEED_SHARE, VORTICITY_SHARE), strict=True)
     ]
     return Flow(provider, frames, np.array(times), *tops)
@@ -85,7 +85,7 @@ def shown(t: Array) -> Indices:
     return np.unique([np.argmin(np.abs(t - time)) for time in [*paper, *others]])
 
 
-def _top(values: Single, share: float) -> float:
+def round_top(values: Single, share: float) -> float:
     """Return a round number that this percentage of the values is below."""
     finite = values[np.isfinite(values)]
     top = float(np.percentile(finite, share)) if finite.size else 0.0

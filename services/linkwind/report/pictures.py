@@ -44,7 +44,7 @@ def png(run: Run, flow: Flow) -> tuple[bytes, int, int, list[float]]:
     Returns:
         the picture as PNG with a palette, its width and height in pixels, and the times [s].
     """
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # no word about a home that it cannot write to
+    quiet()
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
@@ -60,6 +60,11 @@ def png(run: Run, flow: Flow) -> tuple[bytes, int, int, list[float]]:
         thin = image.convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE)
     thin.save(data, "PNG", optimize=True)
     return data.getvalue(), *thin.size, [frame.time_ns / 1e9 for frame in frames]
+
+
+def quiet() -> None:
+    """Keep matplotlib from a word about a home that it cannot write to."""
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
 
 
 def _palette(fills: tuple[Any, Any]) -> bytes:

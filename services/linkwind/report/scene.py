@@ -24,7 +24,6 @@ def scene(run: Run) -> dict[str, Any] | None:
         return None
     frames = every_nth(len(path.t), FRAMES)
     environment = run.scenario["environment"]
-    gravity = np.abs(environment["gravity"])
     return {
         "t": pack(path.t[frames], "f8"),
         "position": pack(path.position[frames]),
@@ -32,24 +31,40 @@ def scene(run: Run) -> dict[str, Any] | None:
         "force": pack(path.wrench[frames, :, :3]),
         "bodies": [_body(run, i) for i in range(len(run.bodies))],
         "joints": [_joint(run, joint) for joint in run.scenario.get("joints", ())],
-        "planar": run.planar,
-        "up": "z" if not run.planar and gravity[2] > gravity[1] else "y",
+        "planar": flat(run),
+        "up": "z" if upwards(run)[2] else "y",
         "still": [line for picture in pictures_of(environment) for line in _as_data(wires(picture))],
         "wind": environment["wind"],
         "gusts": bool(environment["gusts"]),
     }
 
 
-def _body(run: Run, index: int) -> dict[str, Any]:
+def flat(run: Run) -> bool:
+    """Tell whether a run is seen straight on: it stays in a plane, and sheds no wakes, which do not."""
+    return run.planar and not any(each["model"] == "vortex" for each in run.scenario["providers"])
+
+
+def upwards(run: Run) -> tuple[float, float, float]:
+    """Return the axis of W that is drawn upwards: z where gravity is along it, else y."""
+    gravity = np.abs(run.scenario["environment"]["gravity"])
+    return (0.0, 0.0, 1.0) if not flat(run) and gravity[2] > gravity[1] else (0.0, 1.0, 0.0)
+
+
+def outlines(run: Run, index: int) -> list[Line]:
+    """Return what is drawn of a body: lines in its frame [m], each with whether it is closed."""
     body = run.scenario["bodies"][index]
-    lines = _lines(body, _joint_points(run, body["name"]), run.planar)
+    return _lines(body, _joint_points(run, body["name"]), flat(run))
+
+
+def _body(run: Run, index: int) -> dict[str, Any]:
+    body, lines = run.scenario["bodies"][index], outlines(run, index)
     points = np.vstack([points for points, _ in lines])
     return {
         "name": body["name"],
         "mass": max(body["mass"], 1e-12),  # weights of a mean, which must not all be 0
         "lines": _as_data(lines),
         "thick": not body.get("picture") and (body.get("shape") or {"type": "plate"})["type"] == "plate",
-        "reach": float(np.linalg.norm(points[:, : 2 if run.planar else 3], axis=1).max()),
+        "reach": float(np.linalg.norm(points[:, : 2 if flat(run) else 3], axis=1).max()),
     }
 
 
