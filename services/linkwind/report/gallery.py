@@ -8,14 +8,15 @@ from html import escape
 from linkwind.report.data import Run
 from linkwind.report.flow import Flow
 from linkwind.report.tables import number
+from linkwind.report.wake import Wake
 
 CELL_REYNOLDS = "cell_reynolds"  # a diagnostic of the flow: of a cell and the fastest of wind and bodies
 SPATIAL = 1000  # Reynolds number from which the wake of a bluff body is far from two-dimensional
 
 
 def gallery(run: Run) -> str:
-    """Return the pictures of every provider's flow with their captions; nothing for a run without frames."""
-    return "\n".join(_figure(run, flow) for flow in run.flows)
+    """Return the pictures of every provider's flow and wakes; nothing for a run without frames."""
+    return "\n".join([*(_flow(run, flow) for flow in run.flows), *(_wake(run, wake) for wake in run.wakes)])
 
 
 def _limits(run: Run, flow: Flow) -> str:
@@ -47,7 +48,7 @@ def _round(value: float) -> str:
     return f"{float(f'{value:.2g}'):,.0f}"
 
 
-def _figure(run: Run, flow: Flow) -> str:
+def _flow(run: Run, flow: Flow) -> str:
     from linkwind.report.pictures import png
 
     data, width, height, times = png(run, flow)
@@ -64,9 +65,35 @@ def _figure(run: Run, flow: Flow) -> str:
         f"counter-clockwise.{joints} One scale for all times; where it ends in a tip, values lie beyond. "
         f"The log holds {len(flow.t)} frames.{_limits(run, flow)}"
     )
+    return _figure("Flow", data, width, height, alternative, caption)
+
+
+def _wake(run: Run, wake: Wake) -> str:
+    from linkwind.report.wakepicture import wake_png
+
+    data, width, height, times = wake_png(run, wake)
+    when, provider = ", ".join(f"{t:.3f}" for t in times), wake.provider
+    settings = next(each for each in run.scenario["providers"] if each["name"] == provider)
+    kept = ""
+    if settings["model"] == "vortex":
+        rows, step = settings["vortex"]["wake"], float(run.scenario["coupling"]["step"])
+        kept = f"A wake holds the last {rows} rows, {number(rows * step)} s. "
+    wings = " and ".join(settings["bodies"]) if len(settings["bodies"]) < 4 else f"{len(settings['bodies'])} wings"
+    scale = f"±{number(wake.circulation)} m²/s"
+    alternative = f"Surfaces of vortex rings behind {wings} at t = {when} s, coloured by circulation, {scale}."
+    caption = (
+        f"Wakes that {wings} shed, at t = {when} s, all seen from one side and on one scale. Each cell is a "
+        "vortex ring that goes with the fluid; its colour is its circulation, which it keeps: red and blue turn "
+        "opposite ways, and where it changes from cell to cell there is vorticity. Dark cells are the rings on "
+        f"the wings. {kept}The log holds {len(wake.t)} frames."
+    )
+    return _figure("Wakes", data, width, height, alternative, caption)
+
+
+def _figure(title: str, data: bytes, width: int, height: int, alternative: str, caption: str) -> str:
     source = f"data:image/png;base64,{base64.b64encode(data).decode('ascii')}"
     return (
-        '<figure class="gallery"><h2>Flow</h2><div class="wide" tabindex="0">'
+        f'<figure class="gallery"><h2>{title}</h2><div class="wide" tabindex="0">'
         f'<img src="{source}" width="{width}" height="{height}" alt="{escape(alternative)}"></div>'
         f"<figcaption>{escape(caption)}</figcaption></figure>"
     )

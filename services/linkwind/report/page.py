@@ -20,7 +20,7 @@ from linkwind.report.scene import scene
 from linkwind.report.tables import tables
 
 _ASSETS = files("linkwind.report").joinpath("assets")
-_SCRIPTS = ("clock.js", "charts.js", "motion.js", "film.js", "scene.js", "main.js")
+_SCRIPTS = ("clock.js", "charts.js", "motion.js", "film.js", "wake.js", "scene.js", "main.js")
 
 
 def render(run: Run) -> str:
@@ -69,6 +69,7 @@ def _data(run: Run) -> dict[str, Any]:
         "t": pack(run.trajectory.t, "f8"),
         "panels": panels(run),
         "flow": _film(run) if moving["planar"] else None,
+        "wake": _wake(run),
     }
 
 
@@ -79,3 +80,12 @@ def _film(run: Run) -> dict[str, Any] | None:
     from linkwind.report.film import film
 
     return film(run.flows[0])
+
+
+def _wake(run: Run) -> dict[str, Any] | None:
+    """Return the wakes in the animation, of the first provider that shows its own."""
+    if not run.wakes:
+        return None
+    from linkwind.report.wakefilm import wake_film
+
+    return wake_film(run.scenario, run.wakes[0])

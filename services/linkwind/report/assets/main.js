@@ -5,6 +5,7 @@ import { makeClock, makeControls, unpack } from "./clock.js";
 import { makeFilm } from "./film.js";
 import { makeMotion } from "./motion.js";
 import { makeScene } from "./scene.js";
+import { makeWake } from "./wake.js";
 
 // The frames of the data block as the film takes them.
 function flowOf({ t, extent, quantities }) {
@@ -23,7 +24,9 @@ if (data.scene === null) {
   clock.series = unpack(data.t);
   makeKey(data.scene.bodies);
   makeControls(clock);
-  const scene = makeScene(document.getElementById("scene"), makeMotion(data.scene, clock.times), clock);
+  const motion = makeMotion(data.scene, clock.times);
+  const scene = makeScene(document.getElementById("scene"), motion, clock);
   if (data.flow) scene.film = makeFilm(flowOf(data.flow), scene.draw);
+  if (data.wake) scene.wake = makeWake({ ...data.wake, times: data.wake.t, frame: async (i) => data.wake.frames[i] }, motion, scene.draw);
   makeCharts(data.panels, clock, document.getElementById("charts"));
 }

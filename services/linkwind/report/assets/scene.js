@@ -4,7 +4,7 @@ import { bodyColour, theme } from "./charts.js";
 import { add, length, makeCamera, nice, number, turned } from "./motion.js";
 
 const GHOSTS = 8; // earlier poses left standing over a whole run
-const WAKE = 4; // sizes of the mechanism that are shown across a flow, and twice as many along it
+const WAKE = 4; // sizes of the mechanism that are shown across a flow or around wakes, and twice as many along it
 
 function arrow(pen, from, to, head) {
   const angle = Math.atan2(to[1] - from[1], to[0] - from[0]), size = Math.hypot(to[0] - from[0], to[1] - from[1]);
@@ -21,7 +21,7 @@ function arrow(pen, from, to, head) {
   pen.fill();
 }
 
-// `motion` has the scene and where everything is; `film`, the flow behind it, may come later.
+// `motion` has the scene and where everything is; `film`, the flow behind it, and `wake` may come later.
 export function makeScene(canvas, motion, clock) {
   const pen = canvas.getContext("2d"), follow = document.getElementById("follow");
   const { scene } = motion, camera = makeCamera(scene);
@@ -29,14 +29,14 @@ export function makeScene(canvas, motion, clock) {
   follow.checked = length(extent()) > 14 * motion.world.reach;
   const windSpeed = length(scene.wind);
   const look = { zoom: 1, pan: [0, 0, 0] };
-  let colour = theme(), film = null;
+  let colour = theme(), film = null, wake = null;
 
-  function aim(now) {
+  function aim(now, trailing) {
     const room = Math.min(camera.w, camera.h), { world } = motion, size = extent();
     const middle = world.low.map((x, k) => x + size[k] / 2);
     if (follow.checked) {
-      camera.centre = motion.centre(now);
-      camera.scale = room / ((film ? WAKE : 2.7) * world.reach);
+      camera.centre = between(motion.centre(now), trailing);
+      camera.scale = room / ((film || wake ? WAKE : 2.7) * world.reach);
     } else {
       let [w, h] = scene.planar ? size : [length(size), length(size)];
       const more = film ? Math.max(0, 2 * WAKE * world.reach - w) : 0; // of the wake, downstream
@@ -46,6 +46,45 @@ export function makeScene(canvas, motion, clock) {
     }
     camera.scale *= look.zoom;
     camera.centre = camera.centre.map((x, k) => x + look.pan[k]);
+  }
+
+  // The middle of the mechanism and of what it trails.
+  function between(centre, trailing) {
+    const points = (trailing ?? []).flatMap(({ bound, lines }) => lines.slice(bound).map((line) => line[line.length >> 1]));
+    if (!points.length) return centre;
+    const low = [0, 1, 2].map((k) => Math.min(centre[k], ...points.map((p) => p[k])));
+    const high = [0, 1, 2].map((k) => Math.max(centre[k], ...points.map((p) => p[k])));
+    return low.map((x, k) => 0.5 * (x + high[k]));
+  }
+
+  // Rings of the wakes, the farthest first.
+  function wakes(trailing) {
+    const rings = [];
+    for (const { bound, lines, rows } of trailing) {
+      const seen = lines.slice(bound).map((line) => line.map(camera.project));
+      for (let i = 0; i + 1 < seen.length; i++) {
+        const row = rows[bound + i], [near, far] = [seen[i], seen[i + 1]];
+        for (let j = 0; j < row.length; j++) {
+          const corners = [near[j], near[j + 1], far[j + 1], far[j]];
+          rings.push([corners[0][2] + corners[2][2], corners, row[j]]);
+        }
+      }
+    }
+    rings.sort((a, b) => a[0] - b[0]);
+    pen.lineWidth = 0.5;
+    for (const [, corners, level] of rings) {
+      const [r, g, b] = wake.colour(level);
+      pen.beginPath();
+      for (const [x, y] of corners) pen.lineTo(x, y);
+      pen.closePath();
+      pen.globalAlpha = 0.72;
+      pen.fillStyle = `rgb(${r}, ${g}, ${b})`;
+      pen.fill();
+      pen.globalAlpha = 0.8;
+      pen.strokeStyle = `rgb(${0.72 * r}, ${0.72 * g}, ${0.72 * b})`;
+      pen.stroke();
+    }
+    pen.globalAlpha = 1;
   }
 
   function grid() {
@@ -217,7 +256,8 @@ export function makeScene(canvas, motion, clock) {
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, camera.w, camera.h);
     pen.font = "12px system-ui, sans-serif";
-    aim(now);
+    const trailing = wake?.at(t);
+    aim(now, trailing);
     const filmed = film?.draw(pen, camera, t);
     if (scene.planar) grid();
     if (!filmed) streaks(t);
@@ -227,6 +267,7 @@ export function makeScene(canvas, motion, clock) {
       const then = clock.first + (clock.last - clock.first) * i / GHOSTS;
       if (then < t) bodies(motion.poses(then), 0.22);
     }
+    if (trailing) wakes(trailing);
     bodies(now, 1, filmed);
     forces(now);
     joints(now, t);
@@ -257,5 +298,5 @@ export function makeScene(canvas, motion, clock) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { colour = theme(); draw(); });
   resize();
   clock.listen(draw);
-  return { draw, look, camera, set film(made) { film = made; } };
+  return { draw, look, camera, set film(made) { film = made; }, set wake(made) { wake = made; } };
 }
