@@ -14,7 +14,7 @@ import numpy as np
 
 from linkwind.errors import LogError
 from linkwind.log import tables
-from linkwind.log.contents import LOG, STATE, STEP, WRENCH
+from linkwind.log.contents import FLOW, LOG, STATE, STEP, WAKE, WRENCH
 from linkwind.log.seek import SeekableLog, open_seekable
 from linkwind.report.arrays import pack
 from linkwind.report.data import Diagnostics, Run, coordinates, no_trajectory
@@ -103,15 +103,16 @@ class Recording:
                 "ended": self.log.ended,
                 "complete": ending.get("complete") == "true" and self.log.trouble is None,
                 "error": self._trouble(),
-                "frames": {provider: self._frames(provider) for provider in self.log.flows},
+                "frames": {provider: self._frames(FLOW + provider) for provider in self.log.flows},
+                "wakes": {provider: self._frames(WAKE + provider) for provider in self.log.wakes},
             }
 
     def _trouble(self) -> str | None:
         damage = self.log.trouble and f"The log is damaged: {self.log.trouble}"
         return "\n".join(text for text in (self.log.error, damage) if text) or None
 
-    def _frames(self, provider: str) -> int:
-        return len(self.log.times(f"/flow/{provider}"))
+    def _frames(self, topic: str) -> int:
+        return len(self.log.times(topic))
 
     def window(self, low: float, high: float) -> dict[str, Any]:
         """Return the scene and the plots between two times [s], both included.

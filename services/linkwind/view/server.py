@@ -29,6 +29,7 @@ from linkwind.errors import InputError, LinkwindError
 from linkwind.view.console import Console
 from linkwind.view.film import Film
 from linkwind.view.recording import Recording
+from linkwind.view.wakefilm import WakeFilm
 
 LOOK, SELDOM = 0.1, 0.5  # s between two looks at a log that grows, and at one that does not
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
@@ -50,6 +51,7 @@ class Pages:
         self._recording = recording
         self._console = console
         self._films: dict[str, Film] = {}
+        self._wakes: dict[str, WakeFilm] = {}
         self.leaving: Callable[[], bool] = lambda: False
 
     def application(self, hosts: Sequence[str]) -> Starlette:
@@ -69,6 +71,8 @@ class Pages:
                 Route("/window", self._window),
                 Route("/reel/{provider}", self._reel),
                 Route("/picture/{provider}/{quantity}/{index:int}", self._picture),
+                Route("/wake/{provider}", self._wake_reel),
+                Route("/wake/{provider}/{index:int}", self._wake_frame),
                 Route("/events", self._events),
                 Route("/steer", self._steer, methods=["POST"]),
                 Mount("/report", StaticFiles(directory=report)),
@@ -101,6 +105,21 @@ class Pages:
             raise HTTPException(404, "no such frame")
         data, extent = found
         return Response(data, media_type="image/webp", headers={"X-Extent": json.dumps(extent)})
+
+    def _wake(self, request: Request) -> WakeFilm:
+        provider = request.path_params["provider"]
+        if provider not in self._recording.log.wakes:
+            raise HTTPException(404, f'no wakes of "{provider}" in the log')
+        return self._wakes.setdefault(provider, WakeFilm(self._recording, provider))
+
+    def _wake_reel(self, request: Request) -> Response:
+        return JSONResponse(self._wake(request).reel())
+
+    def _wake_frame(self, request: Request) -> Response:
+        found = self._wake(request).frame(request.path_params["index"])
+        if found is None:
+            raise HTTPException(404, "no such frame")
+        return JSONResponse(found)
 
     async def _steer(self, request: Request) -> Response:
         """Pass on what a viewer wants; a page of another site cannot send this kind of content unasked."""

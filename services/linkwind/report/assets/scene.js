@@ -2,9 +2,10 @@
 
 import { bodyColour, theme } from "./charts.js";
 import { add, length, makeCamera, nice, number, turned } from "./motion.js";
+import { around } from "./wake.js";
 
 const GHOSTS = 8; // earlier poses left standing over a whole run
-const WAKE = 4; // sizes of the mechanism that are shown across a flow or around wakes, and twice as many along it
+const WAKE = 4; // sizes of the mechanism that are shown across a flow, and twice as many along it
 
 function arrow(pen, from, to, head) {
   const angle = Math.atan2(to[1] - from[1], to[0] - from[0]), size = Math.hypot(to[0] - from[0], to[1] - from[1]);
@@ -35,8 +36,9 @@ export function makeScene(canvas, motion, clock) {
     const room = Math.min(camera.w, camera.h), { world } = motion, size = extent();
     const middle = world.low.map((x, k) => x + size[k] / 2);
     if (follow.checked) {
-      camera.centre = between(motion.centre(now), trailing);
-      camera.scale = room / ((film || wake ? WAKE : 2.7) * world.reach);
+      const { middle, half } = around(motion.centre(now), world.reach, trailing);
+      camera.centre = middle;
+      camera.scale = room / (film ? WAKE * world.reach : 2 * half);
     } else {
       let [w, h] = scene.planar ? size : [length(size), length(size)];
       const more = film ? Math.max(0, 2 * WAKE * world.reach - w) : 0; // of the wake, downstream
@@ -46,15 +48,6 @@ export function makeScene(canvas, motion, clock) {
     }
     camera.scale *= look.zoom;
     camera.centre = camera.centre.map((x, k) => x + look.pan[k]);
-  }
-
-  // The middle of the mechanism and of what it trails.
-  function between(centre, trailing) {
-    const points = (trailing ?? []).flatMap(({ bound, lines }) => lines.slice(bound).map((line) => line[line.length >> 1]));
-    if (!points.length) return centre;
-    const low = [0, 1, 2].map((k) => Math.min(centre[k], ...points.map((p) => p[k])));
-    const high = [0, 1, 2].map((k) => Math.max(centre[k], ...points.map((p) => p[k])));
-    return low.map((x, k) => 0.5 * (x + high[k]));
   }
 
   // Rings of the wakes, the farthest first.

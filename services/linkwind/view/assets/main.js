@@ -4,6 +4,7 @@ import { makeCharts, makeKey } from "/report/charts.js";
 import { unpack } from "/report/clock.js";
 import { makeFilm } from "/report/film.js";
 import { makeScene } from "/report/scene.js";
+import { makeWake } from "/report/wake.js";
 import { makeClock } from "./clock.js";
 import { makeHand } from "./hand.js";
 import { makePlaybar } from "./playbar.js";
@@ -32,7 +33,7 @@ const run = { steered: facts.steered, paused: false, rate: 0 };
 const clock = makeClock(facts.step);
 let now = facts; // what the server told last
 let view = null; // of the recording, once it has a state: poses, scene, charts
-let film = null, frames = 0;
+let film = null, frames = 0, wake = null, wakes = 0;
 const loaded = { last: null, every: 1, busy: false, again: 0, timer: 0 };
 
 const playbar = makePlaybar(clock, run, () => loaded.every);
@@ -146,6 +147,18 @@ async function reel() {
   else view.scene.film = film = makeFilm(flow, view.scene.draw, AHEAD);
 }
 
+// Wings and wakes, of the first provider that shows its own.
+async function trail() {
+  const [provider] = Object.keys(now.wakes);
+  if (!provider || view === null || now.wakes[provider] === wakes) return;
+  wakes = now.wakes[provider];
+  const reel = await ask(`wake/${provider}`);
+  if (!reel) return;
+  const made = { ...reel, times: reel.t, frame: (i) => ask(`wake/${provider}/${i}?scale=${reel.top}`) };
+  if (wake) wake.update(made);
+  else view.scene.wake = wake = makeWake(made, view.poses, view.scene.draw);
+}
+
 async function update(news) {
   const { poses, ...rest } = news;
   now = { ...now, ...rest };
@@ -160,6 +173,7 @@ async function update(news) {
   tell();
   await load();
   await reel();
+  await trail();
 }
 
 tell();

@@ -1,11 +1,13 @@
 // A mechanism in space: solids, joints, forces and the way of the centre of mass, orbited with the mouse.
 
 import { bodyColour, theme } from "/report/charts.js";
-import { add, length, nice, number, turned } from "/report/motion.js";
+import { add, length, number, turned } from "/report/motion.js";
+import { around } from "/report/wake.js";
 
 const SIDES = 10; // of the head of an arrow
 const ARROW = 0.14; // of the room's side, the longest arrow: it stays in the room wherever it begins
 const FRAME = 30; // ms between two pictures at least
+const LEVELS = 127; // of circulation, above 0
 
 // Triangles over closed lines of a body: caps, and sides between the two faces of an outline.
 function facesOf(body) {
@@ -54,16 +56,36 @@ export function makeSpace(host, motion, clock) {
   const bodies = scene.bodies.map((body) => ({ ...facesOf(body), edges: edgesOf(body) }));
   const still = columns(edgesOf({ lines: scene.still }));
   const up = scene.up === "z" ? { x: 0, y: 0, z: 1 } : { x: 0, y: 1, z: 0 };
-  let colour = theme(), drawn = 0, waiting = 0, ready = false;
+  let colour = theme(), drawn = 0, waiting = 0, ready = false, wake = null, coloured = false;
 
   const place = (pose, points) => columns(points.map((p) => p && add(pose.at, turned(pose.q, p))));
 
   // The room to look at: a cube, so that lengths are the same along every axis.
-  function room(now) {
+  function room(now, wings) {
     const { low, high, reach } = motion.world;
-    const middle = follow.checked ? motion.centre(now) : low.map((x, k) => (x + high[k]) / 2);
-    const half = follow.checked ? 1.4 * reach : 0.7 * Math.max(...high.map((x, k) => x - low[k]), 1e-9);
+    const near = around(motion.centre(now), 1.04 * reach, wings);
+    const middle = follow.checked ? near.middle : low.map((x, k) => (x + high[k]) / 2);
+    const half = follow.checked ? near.half : 0.7 * Math.max(...high.map((x, k) => x - low[k]), 1e-9);
     return middle.map((x) => [x - half, x + half]);
+  }
+
+  // The rings of the wakes as triangles, their circulation, and their edges.
+  function sheets(wings) {
+    const points = [], triangles = [], levels = [], lines = [];
+    for (const { bound, lines: all, rows } of wings ?? []) {
+      const edges = all.slice(bound), across = edges[0].length, start = points.length;
+      points.push(...edges.flat());
+      for (const edge of edges) lines.push(...edge, null);
+      for (let j = 0; j < across; j++) lines.push(...edges.map((edge) => edge[j]), null);
+      for (let i = 0; i + 1 < edges.length; i++) {
+        for (let j = 0; j + 1 < across; j++) {
+          const a = start + i * across + j, level = rows[bound + i][j];
+          triangles.push([a, a + 1, a + across], [a + across, a + 1, a + across + 1]);
+          levels.push(level, level);
+        }
+      }
+    }
+    return { points, triangles, levels, lines };
   }
 
   function arrows(now, metres) {
@@ -81,21 +103,22 @@ export function makeSpace(host, motion, clock) {
 
   // What changes with time, trace by trace.
   function frame(t) {
-    const now = motion.poses(t), ranges = room(now), metres = ranges[0][1] - ranges[0][0];
+    const now = motion.poses(t), wings = wake?.at(t), ranges = room(now, wings), metres = ranges[0][1] - ranges[0][0];
     const { lines, heads } = arrows(now, metres);
     const held = scene.joints.filter(({ until }) => until == null || t <= until);
     const joints = held.map(({ body, point }) => add(now[body].at, turned(now[body].q, point)));
     const path = motion.path.filter((_, i) => motion.times[i] <= t);
+    const sheet = sheets(wings);
     return {
-      ranges,
+      ranges, sheet,
       points: [
         ...bodies.flatMap(({ points, edges }, b) => [place(now[b], points), place(now[b], edges)]),
-        columns(joints), columns(lines), columns(heads), columns(path), still,
+        columns(joints), columns(lines), columns(heads), columns(path), still, columns(sheet.points), columns(sheet.lines),
       ],
     };
   }
 
-  function traces(points) {
+  function traces(points, { triangles, levels }) {
     const [i, j, k] = [0, 1, 2].map((corner) => (faces) => faces.map((face) => face[corner]));
     const at = ([x, y, z]) => ({ x, y, z, hoverinfo: "skip" });
     const ring = scene.bodies.flatMap((_, b) => Array.from({ length: SIDES }, (_, s) => {
@@ -110,15 +133,29 @@ export function makeSpace(host, motion, clock) {
         { type: "scatter3d", mode: "lines", ...at(points[2 * b + 1]), line: { color: own, width: 4 } },
       ];
     });
-    const [joints, lines, heads, path, around] = points.slice(2 * bodies.length);
+    const [joints, lines, heads, path, surroundings, rings, edges] = points.slice(2 * bodies.length);
     return [
       ...made,
       { type: "scatter3d", mode: "markers", ...at(joints), marker: { size: 5, color: colour("card"), line: { color: colour("ink"), width: 2 } } },
       { type: "scatter3d", mode: "lines", ...at(lines), line: { color: colour("force"), width: 6 } },
       { type: "mesh3d", ...at(heads), i: i(ring), j: j(ring), k: k(ring), color: colour("force"), lighting: light },
       { type: "scatter3d", mode: "lines", ...at(path), line: { color: colour("soft"), width: 2, dash: "solid" } },
-      { type: "scatter3d", mode: "lines", ...at(around), line: { color: colour("soft"), width: 3 } },
+      { type: "scatter3d", mode: "lines", ...at(surroundings), line: { color: colour("soft"), width: 3 } },
+      {
+        type: "mesh3d", ...at(rings), i: i(triangles), j: j(triangles), k: k(triangles), intensity: levels, intensitymode: "cell",
+        cmin: -LEVELS, cmax: LEVELS, colorscale: scale(), showscale: false, opacity: 0.9, flatshading: true,
+        lighting: { ambient: 0.9, diffuse: 0.3, specular: 0, roughness: 1 },
+      },
+      { type: "scatter3d", mode: "lines", ...at(edges), line: { color: colour("soft"), width: 1 }, opacity: 0.35 },
     ];
+  }
+
+  // The colours of circulation, from the most negative.
+  function scale() {
+    return Array.from({ length: 33 }, (_, i) => {
+      const [r, g, b] = wake?.colours ? wake.colour(Math.round((i / 16 - 1) * LEVELS)) : [128, 128, 128];
+      return [i / 32, `rgb(${r}, ${g}, ${b})`];
+    });
   }
 
   // From so far away that the whole room is in the picture, with the numbers below its edges.
@@ -154,11 +191,14 @@ export function makeSpace(host, motion, clock) {
 
   async function paint() {
     if (!ready) return;
-    const { ranges, points } = frame(clock.t);
+    const { ranges, points, sheet } = frame(clock.t), rings = points.length - 2;
+    if (coloured !== !!wake?.colours) { coloured = !coloured; await Plotly.restyle(host, { colorscale: [scale()] }, [rings]); }
     const at = (k) => points.map((each) => each[k]);
+    const corner = (k) => points.map((_, n) => (n === rings ? sheet.triangles.map((each) => each[k]) : undefined));
+    const intensity = points.map((_, n) => (n === rings ? sheet.levels : undefined));
     const [x, y, z] = ["xaxis", "yaxis", "zaxis"].map((name, k) => [`scene.${name}.range`, ranges[k]]);
     drawn = performance.now();
-    await Plotly.update(host, { x: at(0), y: at(1), z: at(2) }, { ...Object.fromEntries([x, y, z]), annotations: words() });
+    await Plotly.update(host, { x: at(0), y: at(1), z: at(2), i: corner(0), j: corner(1), k: corner(2), intensity }, { ...Object.fromEntries([x, y, z]), annotations: words() });
   }
 
   // As often as time changes, but not faster than a picture takes.
@@ -169,14 +209,14 @@ export function makeSpace(host, motion, clock) {
 
   function dress() {
     colour = theme();
-    const { ranges, points } = frame(clock.t);
+    const { ranges, points, sheet } = frame(clock.t);
     const config = { displayModeBar: false, responsive: true, scrollZoom: true };
-    Plotly.react(host, traces(points), layout(ranges), config).then(() => { ready = true; });
+    Plotly.react(host, traces(points, sheet), layout(ranges), config).then(() => { ready = true; });
   }
 
   dress();
   clock.listen(draw);
   follow.addEventListener("change", draw);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", dress);
-  return { draw };
+  return { draw, set wake(made) { wake = made; } };
 }
