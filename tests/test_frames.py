@@ -1,4 +1,4 @@
-"""Frames of a fluid as messages: arrays to bytes and back, and what is refused."""
+"""Frames of either kind as messages: arrays to bytes and back, and what is refused."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from linkwind.errors import ProtocolError
-from linkwind.frames import FlowFrame, decode
+from linkwind.frames import FlowFrame, Sent, WakeFrame, decode, logged_wake
 from linkwind.schema import MESSAGES
 from tests.flows import equal, vortices
 
@@ -21,7 +21,7 @@ def frame() -> FlowFrame:
 
 
 def test_a_frame_comes_back_bit_for_bit(frame: FlowFrame) -> None:
-    number, again = decode(frame.encode("r1", "aero", 7), "r1", "aero")
+    number, again = decode(Sent("flow", frame.encode("r1", "aero", 7)), "r1", "aero")
     assert number == 7
     assert equal(again, frame)
     assert again.origin == frame.origin
@@ -61,7 +61,7 @@ def test_an_array_of_another_shape_is_refused(frame: FlowFrame) -> None:
 )
 def test_another_message_is_refused(payload: bytes, reason: str) -> None:
     with pytest.raises(ProtocolError, match=reason):
-        decode(payload, "r1", "aero")
+        decode(Sent("flow", payload), "r1", "aero")
 
 
 @pytest.mark.parametrize("field", ["velocity", "pressure", "vorticity"])
@@ -69,4 +69,61 @@ def test_an_array_that_is_too_short_is_refused(frame: FlowFrame, field: str) -> 
     message = MESSAGES["FlowFrame"].FromString(frame.encode("r1", "aero", 1))
     setattr(message, field, getattr(message, field)[:-4])
     with pytest.raises(ProtocolError, match=rf"{field}: expected \d+ bytes for \(28, 32.*\); got \d+"):
-        decode(message.SerializeToString(), "r1", "aero")
+        decode(Sent("flow", message.SerializeToString()), "r1", "aero")
+
+
+@pytest.fixture
+def wake() -> WakeFrame:
+    """Two wings of two rows of three rings, with five rows behind each."""
+    numbers = np.random.default_rng(3).normal(size=2 * 8 * 4 * 3 + 2 * 7 * 3).astype("f4")
+    corner, strength = np.split(numbers, [2 * 8 * 4 * 3])
+    return WakeFrame(40, 40 * STEP_NS, 2, corner.reshape(2, 8, 4, 3), strength.reshape(2, 7, 3))
+
+
+def same(one: WakeFrame, other: WakeFrame) -> bool:
+    numbers = all(getattr(one, name) == getattr(other, name) for name in ("step", "time_ns", "bound", "shape"))
+    return numbers and all(
+        getattr(one, name).tobytes() == getattr(other, name).tobytes() for name in ("corner", "strength")
+    )
+
+
+def test_wings_and_wakes_come_back_bit_for_bit(wake: WakeFrame) -> None:
+    number, again = decode(Sent("wake", wake.encode("r1", "aero", 7)), "r1", "aero")
+    assert number == 7
+    assert isinstance(again, WakeFrame)
+    assert same(again, wake)
+    assert same(logged_wake(wake.encode()), wake)
+
+
+def test_a_log_does_not_hold_who_sent_a_wake(wake: WakeFrame) -> None:
+    message = MESSAGES["WakeFrame"].FromString(wake.encode())
+    assert [field.name for field, _ in message.ListFields()] == [
+        "step", "time_ns", "wings", "rows", "columns", "bound", "corner", "strength",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "reason"),
+    [
+        ("corner", b"1234", r"corner: expected 768 bytes for \(2, 8, 4, 3\); got 4"),
+        ("strength", b"", r"strength: expected 168 bytes for \(2, 7, 3\); got 0"),
+        ("rows", 8, r"corner: expected 864 bytes for \(2, 9, 4, 3\); got 768"),
+        ("wings", 0, r"corner: expected sizes above 0; got \(0, 8, 4, 3\)"),
+        ("columns", 2**32 - 1, r"corner: expected \d+ bytes for \(2, 8, 4294967296, 3\); got 768"),
+        ("bound", 8, "bound: expected at most 7 rows; got 8"),
+    ],
+)
+def test_a_damaged_wake_is_refused(wake: WakeFrame, field: str, value: object, reason: str) -> None:
+    message = MESSAGES["WakeFrame"].FromString(wake.encode("r1", "aero", 1))
+    setattr(message, field, value)
+    with pytest.raises(ProtocolError, match=f"expected a WakeFrame of this run: {reason}"):
+        decode(Sent("wake", message.SerializeToString()), "r1", "aero")
+
+
+def test_a_frame_of_the_other_kind_and_of_none_is_refused(frame: FlowFrame, wake: WakeFrame) -> None:
+    with pytest.raises(ProtocolError, match="expected a WakeFrame of this run: corner: expected"):
+        decode(Sent("wake", frame.encode("r1", "aero", 1)), "r1", "aero")
+    with pytest.raises(ProtocolError, match="expected a FlowFrame of this run: velocity: expected"):
+        decode(Sent("flow", wake.encode("r1", "aero", 1)), "r1", "aero")
+    with pytest.raises(ProtocolError, match='frame from "aero": expected one of flow, wake; got smoke'):
+        decode(Sent("smoke", b""), "r1", "aero")

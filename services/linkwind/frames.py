@@ -6,6 +6,7 @@ is ``schemas/linkwind/v1/observe.proto``.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
@@ -220,8 +221,10 @@ def _frame(kind: str, message: Any, what: str) -> Frame:
 
 def _array(message: Any, name: str, shape: tuple[int, ...], what: str) -> Single:
     data = getattr(message, name)
-    expected = SINGLE.itemsize * int(np.prod(shape, dtype=object))
-    if not expected or len(data) != expected:
+    if 0 in shape:
+        raise ProtocolError(f"{what}: {name}: expected sizes above 0; got {shape}")
+    expected = SINGLE.itemsize * math.prod(shape)
+    if len(data) != expected:
         raise ProtocolError(f"{what}: {name}: expected {expected} bytes for {shape}; got {len(data)}")
     return np.frombuffer(data, SINGLE).reshape(shape)
 

@@ -24,7 +24,7 @@ def march(d: DynamicsSession, link: DynamicsLink) -> list[list[tuple[str, FlowFr
     came = []
 
     def take() -> None:
-        came.append([(name, d.frame(name, payload)) for name, payload in link.frames()])
+        came.append([(name, d.frame(name, sent)) for name, sent in link.frames()])
 
     for step in range(11):
         link.post(d.post(step, 0))

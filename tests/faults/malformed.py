@@ -19,7 +19,7 @@ import numpy as np
 
 from linkwind.checkpoints import Checkpoint
 from linkwind.errors import ParticipantError, SimulationError
-from linkwind.frames import FlowFrame
+from linkwind.frames import FlowFrame, Sent
 from linkwind.messages import MotionMessage, WrenchMessage
 from linkwind.protocol import DynamicsSession, ProviderSession, ProviderState, fault, fault_error
 from linkwind.schema import MESSAGES, SHA256
@@ -158,7 +158,7 @@ class Ends:
                 return "taken"
             return "dropped"
         if kind == "frame":
-            dynamics.frame("aero", payload)
+            dynamics.frame("aero", Sent("flow", payload))
         elif kind == "checkpoint":
             dynamics.checkpoint("aero", payload)
         elif kind == "welcome":

@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 from linkwind.errors import ProtocolError
-from linkwind.frames import FlowFrame
+from linkwind.frames import FlowFrame, Sent
 from linkwind.protocol import DynamicsSession, ProviderSession
 from tests.fakes import FakeModel
 from tests.flows import VortexModel, equal, vortices
@@ -24,7 +24,7 @@ def pair(model: object) -> tuple[DynamicsSession, ProviderSession]:
     return d, p
 
 
-def exchange(d: DynamicsSession, p: ProviderSession, step: int) -> list[bytes]:
+def exchange(d: DynamicsSession, p: ProviderSession, step: int) -> list[Sent]:
     """Do one step; return the frames that were to be sent before the answer."""
     answer = p.answer(d.post(step, 0))
     frames = p.frames()
@@ -32,7 +32,7 @@ def exchange(d: DynamicsSession, p: ProviderSession, step: int) -> list[bytes]:
     return frames
 
 
-def finish(d: DynamicsSession, p: ProviderSession) -> list[bytes]:
+def finish(d: DynamicsSession, p: ProviderSession) -> list[Sent]:
     assert p.answer(d.post(10, 0, final=True)) is None
     frames = p.frames()
     d.control(p.bye())

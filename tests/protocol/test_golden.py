@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from google.protobuf.json_format import MessageToDict, ParseDict
 
-from linkwind.frames import decode
+from linkwind.frames import FlowFrame, Sent, WakeFrame, decode
 from linkwind.messages import MotionMessage, WrenchMessage
 from linkwind.schema import MESSAGES
 
@@ -47,6 +47,7 @@ def vectors() -> dict[str, tuple[str, dict[str, Any]]]:
         "wrench": ("WrenchStep", {**wrench, **loads}),
         "wrench_added_inertia": ("WrenchStep", {**wrench, **loads, "addedInertia": numbers(72, 0.3)}),
         "flow_frame": ("FlowFrame", flow_frame()),
+        "wake_frame": ("WakeFrame", wake_frame()),
         "checkpoint": ("Checkpoint", checkpoint()),
         "welcome_resume": ("Control", {"welcome": welcome()}),
         "welcome_catch_up": ("Control", {"welcome": welcome() | {"catchUp": catch_up()}}),
@@ -104,6 +105,15 @@ def flow_frame() -> dict[str, Any]:
     return {"run": "golden", "provider": "aero", **when, **where, **arrays}
 
 
+def wake_frame() -> dict[str, Any]:
+    """Two wings, a row of rings on each and one behind it, one ring a row; bytes are base64 in JSON."""
+    values = np.array(numbers(40, 0.25), "<f4")
+    parts = {"corner": values[:36], "strength": values[36:]}
+    arrays = {name: base64.b64encode(part.tobytes()).decode() for name, part in parts.items()}
+    when = {"number": "4", "step": "120", "timeNs": "120000000"}
+    return {"run": "golden", "provider": "aero", **when, "wings": 2, "rows": 2, "columns": 1, "bound": 1, **arrays}
+
+
 def write() -> None:
     for name, (message, values) in vectors().items():
         encoded = ParseDict(values, MESSAGES[message]()).SerializeToString(deterministic=True)
@@ -150,10 +160,22 @@ def test_motion_is_written_and_read_as_the_golden_bytes(name: str) -> None:
 
 def test_a_frame_is_written_and_read_as_the_golden_bytes() -> None:
     values, encoded = golden("flow_frame")
-    number, frame = decode(encoded, "golden", "aero")
+    number, frame = decode(Sent("flow", encoded), "golden", "aero")
+    assert isinstance(frame, FlowFrame)
     assert (number, frame.step, frame.time_ns, frame.shape) == (4, 120, 120_000_000, (2, 3))
     assert (frame.cell, frame.origin) == (0.1, (-0.0, -1.25))
     assert frame.vorticity.tobytes() == base64.b64decode(values["vorticity"])
+    assert frame.encode("golden", "aero", 4) == encoded
+
+
+def test_wings_and_wakes_are_written_and_read_as_the_golden_bytes() -> None:
+    values, encoded = golden("wake_frame")
+    number, frame = decode(Sent("wake", encoded), "golden", "aero")
+    assert isinstance(frame, WakeFrame)
+    assert (number, frame.step, frame.time_ns, frame.shape, frame.bound) == (4, 120, 120_000_000, (2, 2, 1), 1)
+    # The second wing begins with number 18, its second edge 6 further, the second corner of that 3 further.
+    assert frame.corner[1, 1, 1].tolist() == np.array(numbers(40, 0.25)[27:30], "<f4").tolist()
+    assert frame.strength.tobytes() == base64.b64decode(values["strength"])
     assert frame.encode("golden", "aero", 4) == encoded
 
 

@@ -1,7 +1,8 @@
-"""Flow and bodies of a log for ParaView and its relatives: files of VTK's XML formats, with their times.
+"""Flow, wakes and bodies of a log for ParaView and its relatives: files of VTK's XML formats, with their times.
 
-Frames of a fluid become images (``flow_PROVIDER_0001.vti``, values in cells), bodies their outlines in the
-plane of the flow, with the forces on them (``bodies_0001.vtu``); ``*.pvd`` hold them together over time.
+Frames of a fluid become images (``flow_PROVIDER_0001.vti``, values in cells), wings and their wakes the rings on
+them (``wake_PROVIDER_0001.vtu``, circulation in cells), bodies their outlines in the plane of the flow, with the
+forces on them (``bodies_0001.vtu``); ``*.pvd`` hold them together over time.
 Bodies are written at the times of the frames, or, without any, at times spread evenly over the run.
 """
 
@@ -15,14 +16,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from linkwind.errors import InputError, LogError
-from linkwind.frames import FlowFrame
+from linkwind.frames import FlowFrame, WakeFrame
 from linkwind.log import contents, tables
 from linkwind.log.reader import Log
 from linkwind.log.scenarios import recorded
 from linkwind.spatial import Array
 
 STATES = 300  # of the bodies, where there are no frames
-VERTEX, POLYLINE, POLYGON = 1, 4, 7  # types of VTK's cells
+VERTEX, POLYLINE, POLYGON, QUAD = 1, 4, 7, 9  # types of VTK's cells
 BLOCK = 1024  # states in memory at a time
 
 
@@ -36,14 +37,14 @@ class Outlines(NamedTuple):
 
 
 def export_vtk(log: Log, folder: Path) -> list[Path]:
-    """Write the frames of every fluid, and the bodies.
+    """Write the frames of every fluid and of all wakes, and the bodies.
 
     Args:
         log: to read.
         folder: for the files; is made if it is not there.
 
     Returns:
-        the collections, one for each fluid and one for the bodies.
+        the collections, one for each fluid, for each provider of wakes, and for the bodies.
 
     Raises:
         InputError: pyevtk is not there.
@@ -64,6 +65,13 @@ def export_vtk(log: Log, folder: Path) -> list[Path]:
             for number, frame in enumerate(log.frames(provider), 1):
                 found.addFile(_image(hl, folder / f"{name}_{number:04}", frame), frame.time_ns / 1e9)
                 times.append(frame.time_ns)
+            written.append(_saved(found, folder / name))
+        for provider in log.wakes:
+            name = f"wake_{provider}"
+            found = group(str(folder / name))
+            for number, wake in enumerate(log.wake_frames(provider), 1):
+                found.addFile(_rings(hl, folder / f"{name}_{number:04}", wake), wake.time_ns / 1e9)
+                times.append(wake.time_ns)
             written.append(_saved(found, folder / name))
         if log.topics.get(contents.STATE):
             found = group(str(folder / "bodies"))
@@ -110,6 +118,23 @@ def _image(hl: Any, path: Path, frame: FlowFrame) -> str:
     }
     spacing = (frame.cell, frame.cell, frame.cell)
     return str(hl.imageToVTK(str(path), origin=(left, bottom, 0.0), spacing=spacing, cellData=data))
+
+
+def _rings(hl: Any, path: Path, frame: WakeFrame) -> str:
+    wings, rows, columns = frame.shape
+    wing, row, column = np.indices(frame.shape).reshape(3, -1)
+    first = (wing * (rows + 1) + row) * (columns + 1) + column
+    across = columns + 1
+    ring = np.stack([first, first + 1, first + across + 1, first + across], axis=1)
+    data = {
+        "circulation [m^2/s]": frame.strength.ravel(),
+        "wing": wing,
+        "row": row,
+        "bound": (row < frame.bound).astype(np.uint8),
+    }
+    x, y, z = (np.ascontiguousarray(axis) for axis in frame.corner.reshape(-1, 3).T)
+    ends, kinds = 4 * np.arange(1, ring.shape[0] + 1), np.full(ring.shape[0], QUAD, np.uint8)
+    return str(hl.unstructuredGridToVTK(str(path), x, y, z, ring.ravel(), ends, kinds, cellData=data))
 
 
 def _states(log: Log, times: Sequence[int]) -> Iterator[tuple[int, dict[str, Any]]]:

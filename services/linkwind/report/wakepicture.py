@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 AZIMUTH, ELEVATION = np.radians(128.0), np.radians(24.0)  # of the eye, from the way that the wakes trail
 AWAY = 3.2  # of the eye, in radii of what is seen
+SEAM = "#8b949d"  # between the rings of a wing
 SUN = 0.35  # share of a ring's light that depends on how it lies to the eye
 MARGIN = 0.04
 WIDTH, SHARPNESS = 12.0, 160  # inches and dots an inch of the figure
@@ -140,7 +141,7 @@ def _draw(ax: Axes, run: Run, frame: WakeFrame, view: View, mapped: Any) -> None
     wing[:, : frame.bound] = True
     colour = np.where(wing[..., None], to_rgb(BODY), mapped.cmap(mapped.norm(frame.strength))[..., :3])
     colour = colour * _light(polygon, view)[..., None]
-    edge = np.where(wing[..., None], to_rgb(PAPER), 0.72 * colour)
+    edge = np.where(wing[..., None], to_rgb(SEAM), 0.72 * colour)
     opacity = np.where(wing, 1.0, 0.9)[..., None]
     face, edge = (np.concatenate([each, opacity], axis=-1).reshape(-1, 4) for each in (colour, edge))
     seen = view.project(polygon.reshape(-1, 4, 3), _centre(frame))

@@ -36,9 +36,9 @@ export function makeScene(canvas, motion, clock) {
     const room = Math.min(camera.w, camera.h), { world } = motion, size = extent();
     const middle = world.low.map((x, k) => x + size[k] / 2);
     if (follow.checked) {
-      const { middle, half } = around(motion.centre(now), world.reach, trailing);
+      const { middle, radius } = around(motion.centre(now), world.reach, trailing);
       camera.centre = middle;
-      camera.scale = room / (film ? WAKE * world.reach : 2 * half);
+      camera.scale = room / (film ? WAKE * world.reach : 2 * radius);
     } else {
       let [w, h] = scene.planar ? size : [length(size), length(size)];
       const more = film ? Math.max(0, 2 * WAKE * world.reach - w) : 0; // of the wake, downstream

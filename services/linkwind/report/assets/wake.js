@@ -31,13 +31,14 @@ function decoded(frame, motion, bodies) {
 const AHEAD = 2; // frames that are loaded before they are due
 const KEPT = 4000; // trailing edges that are remembered
 
-// The middle of the mechanism and of what it trails, and how far they reach from there [m].
+// The middle of the mechanism and of what it trails; how far they reach from there along the axes, and at all [m].
 export function around(centre, reach, wings) {
   const points = (wings ?? []).flatMap(({ bound, lines }) => lines.slice(bound).flatMap((line) => [line[0], line.at(-1)]));
   const low = [...centre], high = [...centre];
   for (const p of points) for (let k = 0; k < 3; k++) { low[k] = Math.min(low[k], p[k]); high[k] = Math.max(high[k], p[k]); }
   const size = low.map((x, k) => high[k] - x);
-  return { middle: low.map((x, k) => x + 0.5 * size[k]), half: Math.max(1.35 * reach, 0.5 * Math.hypot(...size) + 0.45 * reach) };
+  const half = (extent) => Math.max(1.35 * reach, 0.5 * extent + 0.45 * reach);
+  return { middle: low.map((x, k) => x + 0.5 * size[k]), side: half(Math.max(...size)), radius: half(Math.hypot(...size)) };
 }
 
 // `wakes` has the times, bodies, step, top, colours, and `frame(i)`, which promises a frame.

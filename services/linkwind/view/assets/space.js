@@ -65,7 +65,7 @@ export function makeSpace(host, motion, clock) {
     const { low, high, reach } = motion.world;
     const near = around(motion.centre(now), 1.04 * reach, wings);
     const middle = follow.checked ? near.middle : low.map((x, k) => (x + high[k]) / 2);
-    const half = follow.checked ? near.half : 0.7 * Math.max(...high.map((x, k) => x - low[k]), 1e-9);
+    const half = follow.checked ? near.side : 0.7 * Math.max(...high.map((x, k) => x - low[k]), 1e-9);
     return middle.map((x) => [x - half, x + half]);
   }
 
