@@ -41,7 +41,7 @@ def scene(run: Run) -> dict[str, Any] | None:
 
 def flat(run: Run) -> bool:
     """Tell whether a run is seen straight on: it stays in a plane, and sheds no wakes, which do not."""
-    return run.planar and not any(each["model"] == "vortex" for each in run.scenario["providers"])
+    return run.planar and not any(each["model"] == "vortex" for each in run.scenario.get("providers", ()))
 
 
 def upwards(run: Run) -> tuple[float, float, float]:
