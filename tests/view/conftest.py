@@ -27,9 +27,16 @@ transport = "inprocess"
 """
 
 
+WAKES = [
+    "time.end=0.04",
+    "aero.model=vortex",
+    *(f"aero.vortex.{setting}" for setting in ("chordwise=2", "spanwise=3", "wake=15", "frames=4")),
+]
+
+
 @pytest.fixture(scope="package")
 def logs(tmp_path_factory):
-    """Logs by name: planar, with a flow, in space, cut."""
+    """Logs by name: planar, with a flow, in space, with wakes, cut."""
     folder = tmp_path_factory.mktemp("logs")
     here = ["bus.transport=inprocess"]
 
@@ -40,6 +47,7 @@ def logs(tmp_path_factory):
     made = {
         "planar": log("planar", "two_link", [*here, "time.end=0.3"]),
         "space": log("space", str(folder / "spinner.toml"), []),
+        "wakes": log("wakes", "flapper", [*here, *WAKES]),
     }
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(aero.MODELS, "none", lambda scenario, provider: VortexModel(every=10))

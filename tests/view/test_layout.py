@@ -23,7 +23,7 @@ def leaves(node):
     return leaves(node["first"]) + leaves(node["second"])
 
 
-@pytest.mark.parametrize("name", ["planar", "flow", "space"])
+@pytest.mark.parametrize("name", ["planar", "flow", "space", "wakes"])
 def test_the_importer_takes_it(logs, name):
     made = json.loads(json.dumps(layout(open_recording(logs[name]))))
     assert all(isinstance(made[key], dict) for key in ("configById", "globalVariables", "userNodes"))
@@ -32,7 +32,7 @@ def test_the_importer_takes_it(logs, name):
     assert {panel.split("!")[0] for panel in made["configById"]} == {"3D", "Plot"}
 
 
-@pytest.mark.parametrize("name", ["planar", "flow", "space"])
+@pytest.mark.parametrize("name", ["planar", "flow", "space", "wakes"])
 def test_the_log_has_what_it_shows(logs, name):
     log = open_log(logs[name])
     made = layout(open_recording(logs[name]))["configById"]
@@ -40,7 +40,8 @@ def test_the_log_has_what_it_shows(logs, name):
     assert set(scene["topics"]) <= set(log.topics)
     assert scene["followTf"] in log.bodies
     assert ("/flow/aero" in scene["topics"]) == (name == "flow")
-    assert scene["cameraState"]["perspective"] == (name == "space")
+    assert ("/scene/wake/aero" in scene["topics"]) == (name == "wakes")
+    assert scene["cameraState"]["perspective"] == (name in ("space", "wakes"))
     columns = log.columns("/state")
     curves = [curve["value"] for panel in made.values() for curve in panel.get("paths", ())]
     assert len(curves) > 4

@@ -71,7 +71,10 @@ def _flow(run: Run, flow: Flow) -> str:
 def _wake(run: Run, wake: Wake) -> str:
     from linkwind.report.wakepicture import wake_png
 
-    data, width, height, times = wake_png(run, wake)
+    drawn = wake_png(run, wake)
+    if drawn is None:
+        return ""
+    data, width, height, times = drawn
     when, provider = ", ".join(f"{t:.3f}" for t in times), wake.provider
     settings = next(each for each in run.scenario["providers"] if each["name"] == provider)
     kept = ""

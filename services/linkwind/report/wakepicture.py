@@ -51,18 +51,21 @@ class Surface(NamedTuple):
     strength: Array
 
 
-def wake_png(run: Run, wake: Wake) -> tuple[bytes, int, int, list[float]]:
+def wake_png(run: Run, wake: Wake) -> tuple[bytes, int, int, list[float]] | None:
     """Draw wings and wakes at chosen times.
 
     Returns:
-        the picture as PNG, its width and height in pixels, and the times [s].
+        the picture as PNG, its width and height in pixels, and the times [s]; None if every frame at these
+        times has corners that are no numbers.
     """
     quiet()
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
 
-    frames = list(wake.some(shown_wakes(wake.t)))
+    frames = [frame for frame in wake.some(shown_wakes(wake.t)) if np.isfinite(frame.corner).all()]
+    if not frames:
+        return None
     drawn, data = io.BytesIO(), io.BytesIO()
     with matplotlib.rc_context(STYLE):
         figure = _figure(run, wake, frames)
