@@ -81,7 +81,9 @@ def wake() -> WakeFrame:
 
 
 def same(one: WakeFrame, other: WakeFrame) -> bool:
-    numbers = all(getattr(one, name) == getattr(other, name) for name in ("step", "time_ns", "bound", "shape"))
+    numbers = all(
+        getattr(one, name) == getattr(other, name) for name in ("step", "time_ns", "bound", "shape")
+    )
     return numbers and all(
         getattr(one, name).tobytes() == getattr(other, name).tobytes() for name in ("corner", "strength")
     )

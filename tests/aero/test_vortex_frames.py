@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -80,7 +82,7 @@ def test_wing_and_wake_are_where_they_are_at_one_time() -> None:
 def test_a_line_of_the_wake_goes_with_the_fluid_and_its_rings_keep_their_strength() -> None:
     model, of = made(30)
     frames = fly(model, of, range(12))
-    for one, next_ in zip(frames[1:], frames[2:], strict=False):
+    for one, next_ in pairwise(frames[1:]):
         rows = min(one.shape[1], next_.shape[1] - 1) - 2
         assert np.array_equal(next_.strength[:, 3 : 3 + rows], one.strength[:, 2 : 2 + rows])
         # The ring that is shed is that of the last row on the wing.

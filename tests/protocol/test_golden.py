@@ -111,7 +111,16 @@ def wake_frame() -> dict[str, Any]:
     parts = {"corner": values[:36], "strength": values[36:]}
     arrays = {name: base64.b64encode(part.tobytes()).decode() for name, part in parts.items()}
     when = {"number": "4", "step": "120", "timeNs": "120000000"}
-    return {"run": "golden", "provider": "aero", **when, "wings": 2, "rows": 2, "columns": 1, "bound": 1, **arrays}
+    return {
+        "run": "golden",
+        "provider": "aero",
+        **when,
+        "wings": 2,
+        "rows": 2,
+        "columns": 1,
+        "bound": 1,
+        **arrays,
+    }
 
 
 def write() -> None:
@@ -172,7 +181,13 @@ def test_wings_and_wakes_are_written_and_read_as_the_golden_bytes() -> None:
     values, encoded = golden("wake_frame")
     number, frame = decode(Sent("wake", encoded), "golden", "aero")
     assert isinstance(frame, WakeFrame)
-    assert (number, frame.step, frame.time_ns, frame.shape, frame.bound) == (4, 120, 120_000_000, (2, 2, 1), 1)
+    assert (number, frame.step, frame.time_ns, frame.shape, frame.bound) == (
+        4,
+        120,
+        120_000_000,
+        (2, 2, 1),
+        1,
+    )
     # The second wing begins with number 18, its second edge 6 further, the second corner of that 3 further.
     assert frame.corner[1, 1, 1].tolist() == np.array(numbers(40, 0.25)[27:30], "<f4").tolist()
     assert frame.strength.tobytes() == base64.b64decode(values["strength"])

@@ -104,7 +104,9 @@ def test_a_frame_on_the_page_is_the_frame_to_its_last_place(run, frames, page):
 
 
 def test_what_is_no_number_does_not_end_the_report(run, frames):
-    wild = dataclasses.replace(frames[-1], corner=frames[-1].corner.copy(), strength=frames[-1].strength.copy())
+    wild = dataclasses.replace(
+        frames[-1], corner=frames[-1].corner.copy(), strength=frames[-1].strength.copy()
+    )
     wild.corner[0, 3], wild.strength[1] = (np.inf, np.nan, 1.0), np.nan
     assert np.isfinite(coded(wild, 1.0)["middle"]).all()
     wake = survey_wake("aero", lambda: iter([*frames[:-1], wild]))

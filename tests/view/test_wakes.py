@@ -9,9 +9,9 @@ from linkwind.log.reader import open_log
 
 from .pages import scrub, served, show, troubles
 
-# A wing of one ring that goes ahead with 2 m/s in still air: what it sheds stays where it is. Steps of 1 ms, frames
-# at the steps 0, 10 and 20; a wake keeps 15 rows. Corners are whole numbers of mm, those of the edges at x = −4 mm
-# (leading) and 0 (trailing) of the body.
+# A wing of one ring that goes ahead with 2 m/s in still air: what it sheds stays where it is. Steps of 1 ms,
+# frames at the steps 0, 10 and 20; a wake keeps 15 rows. Corners are whole numbers of mm; the leading edge is
+# at x = 4 mm of the body, the trailing edge at 0.
 STRAIGHT = """
 (async () => {
   const { makeWake } = await import("/report/wake.js"), base64 = (array) => btoa(String.fromCharCode(...new Uint8Array(array.buffer)));

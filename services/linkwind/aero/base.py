@@ -51,7 +51,8 @@ class ForceModel(Protocol):
     is None for no force at all.
 
     A model may have two methods more. ``frame() -> Frame | None`` is called after each ``evaluate`` and after
-    the last ``commit``, and returns the picture of its fluid that is due (:mod:`linkwind.frames`), each once. ``close()`` ends what the model holds, such as a process of its own.
+    the last ``commit``, and returns the picture of its fluid that is due (:mod:`linkwind.frames`), each once.
+    ``close()`` ends what the model holds, such as a process of its own.
     """
 
     def __init__(self, scenario: Scenario, provider: Provider) -> None:

@@ -1,9 +1,9 @@
 """What a transport has to offer: the two ends of the bus.
 
 A transport moves ``(key, bytes)`` and tells who is there; it knows no message but Fault. Keys are
-``linkwind/v1/<run>/motion``, ``…/wrench/<provider>``, ``…/observe/<kind>/<provider>`` with the kind of a frame
-or ``checkpoint``, ``…/control/<provider>``, ``…/refusal``, ``…/fault`` and ``…/alive/<participant>``, and for
-listeners ``…/scenario`` and ``…/log/**``.
+``linkwind/v1/<run>/motion``, ``…/wrench/<provider>``, ``…/observe/<kind>/<provider>`` with the kind of a
+frame or ``checkpoint``, ``…/control/<provider>``, ``…/refusal``, ``…/fault`` and ``…/alive/<participant>``,
+and for listeners ``…/scenario`` and ``…/log/**``.
 """
 
 from __future__ import annotations

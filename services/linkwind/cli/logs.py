@@ -93,7 +93,7 @@ def export(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the files.")],
     format_: Annotated[Format, typer.Option("--format", help="Kind of files.")] = Format.CSV,
 ) -> None:
-    """Write trajectory, steps and wrenches of a log as tables; with vtk, its flow and bodies for ParaView.
+    """Write trajectory, steps and wrenches of a log as tables; with vtk, flow, wakes and bodies for ParaView.
 
     Example: linkwind log export runs/two_link-20260101-120000/log.mcap -o tables --format csv
     """

@@ -1,4 +1,4 @@
-"""Frames as the log holds them: of a flow a ``foxglove.Grid``, of wakes a ``WakeFrame`` without its sender."""
+"""Frames as the log holds them: a flow as ``foxglove.Grid``, wakes as ``WakeFrame`` without its sender."""
 
 from __future__ import annotations
 

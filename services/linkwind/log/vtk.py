@@ -1,8 +1,8 @@
-"""Flow, wakes and bodies of a log for ParaView and its relatives: files of VTK's XML formats, with their times.
+"""Flow, wakes and bodies of a log for ParaView and its relatives: files of VTK's XML formats, with times.
 
-Frames of a fluid become images (``flow_PROVIDER_0001.vti``, values in cells), wings and their wakes the rings on
-them (``wake_PROVIDER_0001.vtu``, circulation in cells), bodies their outlines in the plane of the flow, with the
-forces on them (``bodies_0001.vtu``); ``*.pvd`` hold them together over time.
+Frames of a fluid become images (``flow_PROVIDER_0001.vti``, values in cells), wings and their wakes the rings
+on them (``wake_PROVIDER_0001.vtu``, circulation in cells), bodies their outlines in the plane of the flow,
+with the forces on them (``bodies_0001.vtu``); ``*.pvd`` hold them together over time.
 Bodies are written at the times of the frames, or, without any, at times spread evenly over the run.
 """
 
@@ -121,7 +121,7 @@ def _image(hl: Any, path: Path, frame: FlowFrame) -> str:
 
 
 def _rings(hl: Any, path: Path, frame: WakeFrame) -> str:
-    wings, rows, columns = frame.shape
+    _, rows, columns = frame.shape
     wing, row, column = np.indices(frame.shape).reshape(3, -1)
     first = (wing * (rows + 1) + row) * (columns + 1) + column
     across = columns + 1

@@ -81,14 +81,20 @@ def _wake(run: Run, wake: Wake) -> str:
     if settings["model"] == "vortex":
         rows, step = settings["vortex"]["wake"], float(run.scenario["coupling"]["step"])
         kept = f"A wake holds the last {rows} rows, {number(rows * step)} s. "
-    wings = " and ".join(settings["bodies"]) if len(settings["bodies"]) < 4 else f"{len(settings['bodies'])} wings"
+    wings = (
+        " and ".join(settings["bodies"])
+        if len(settings["bodies"]) < 4
+        else f"{len(settings['bodies'])} wings"
+    )
     scale = f"±{number(wake.circulation)} m²/s"
-    alternative = f"Surfaces of vortex rings behind {wings} at t = {when} s, coloured by circulation, {scale}."
+    alternative = (
+        f"Surfaces of vortex rings behind {wings} at t = {when} s, coloured by circulation, {scale}."
+    )
     caption = (
         f"Wakes that {wings} shed, at t = {when} s, all seen from one side and on one scale. Each cell is a "
-        "vortex ring that goes with the fluid; its colour is its circulation, which it keeps: red and blue turn "
-        "opposite ways, and where it changes from cell to cell there is vorticity. Dark cells are the rings on "
-        f"the wings. {kept}The log holds {len(wake.t)} frames."
+        "vortex ring that goes with the fluid; its colour is its circulation, which it keeps: red and blue "
+        "turn opposite ways, and where it changes from cell to cell there is vorticity. Dark cells are the "
+        f"rings on the wings. {kept}The log holds {len(wake.t)} frames."
     )
     return _figure("Wakes", data, width, height, alternative, caption)
 

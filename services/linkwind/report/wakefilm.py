@@ -1,8 +1,8 @@
 """Wings and wakes for the animations: corners and circulation of each frame in few bytes.
 
 A corner is three int16 on the box of its frame, 0.02 mm in a wake of 1.5 m; a circulation is an int8 on one
-scale for all frames. Lines of a wake are told by the step at which they were shed, so that the page can follow
-them from frame to frame.
+scale for all frames. Lines of a wake are told by the step at which they were shed, so that the page can
+follow them from frame to frame.
 """
 
 from __future__ import annotations

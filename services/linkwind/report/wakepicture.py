@@ -44,13 +44,6 @@ class View(NamedTuple):
         return np.stack([off @ self.right * scale, off @ self.up * scale, distance], axis=-1)
 
 
-class Surface(NamedTuple):
-    """Polygons in W [m], shape (k, 4, 3), and the circulation of each; NaN on a wing."""
-
-    polygon: Array
-    strength: Array
-
-
 def wake_png(run: Run, wake: Wake) -> tuple[bytes, int, int, list[float]] | None:
     """Draw wings and wakes at chosen times.
 
@@ -100,8 +93,9 @@ def _figure(run: Run, wake: Wake, frames: list[WakeFrame]) -> Figure:
         ax.set(xlim=(x - 0.5 * width, x + 0.5 * width), ylim=(y - 0.5 * height, y + 0.5 * height))
         ax.set_title(f"t = {frame.time_ns / 1e9:.3f} s")
     _key(axes.flat[-1], view, width, height)
-    bar = {"aspect": 24, "pad": 0.01, "shrink": 0.6}
-    figure.colorbar(mapped, ax=list(axes.flat), label="circulation of a ring [m²/s]", **bar)
+    figure.colorbar(
+        mapped, ax=list(axes.flat), label="circulation of a ring [m²/s]", aspect=24, pad=0.01, shrink=0.6
+    )
     return figure
 
 
@@ -123,13 +117,14 @@ def _view(run: Run, frames: list[WakeFrame]) -> View:
 
 
 def _centre(frame: WakeFrame) -> Array:
-    points = frame.corner.reshape(-1, 3).astype(float)
-    return 0.5 * (points.min(axis=0) + points.max(axis=0))
+    points = frame.corner.reshape(-1, 3).astype(np.float64)
+    return np.asarray(0.5 * (points.min(axis=0) + points.max(axis=0)))
 
 
 def _box(view: View, frame: WakeFrame) -> tuple[Array, Array]:
     """Return the lower left and the upper right corner of what is seen of a frame [m]."""
-    seen = view.project(frame.corner.reshape(-1, 3), _centre(frame))[:, :2]
+    points = frame.corner.reshape(-1, 3).astype(np.float64)
+    seen = view.project(points, _centre(frame))[:, :2]
     return seen.min(axis=0), seen.max(axis=0)
 
 
@@ -139,7 +134,9 @@ def _draw(ax: Axes, run: Run, frame: WakeFrame, view: View, mapped: Any) -> None
     from matplotlib.colors import to_rgb
 
     corner = frame.corner.astype(float)
-    polygon = np.stack([corner[:, :-1, :-1], corner[:, :-1, 1:], corner[:, 1:, 1:], corner[:, 1:, :-1]], axis=-2)
+    polygon = np.stack(
+        [corner[:, :-1, :-1], corner[:, :-1, 1:], corner[:, 1:, 1:], corner[:, 1:, :-1]], axis=-2
+    )
     wing = np.zeros(frame.shape, bool)
     wing[:, : frame.bound] = True
     colour = np.where(wing[..., None], to_rgb(BODY), mapped.cmap(mapped.norm(frame.strength))[..., :3])
@@ -149,7 +146,9 @@ def _draw(ax: Axes, run: Run, frame: WakeFrame, view: View, mapped: Any) -> None
     face, edge = (np.concatenate([each, opacity], axis=-1).reshape(-1, 4) for each in (colour, edge))
     seen = view.project(polygon.reshape(-1, 4, 3), _centre(frame))
     order = np.argsort(-seen[..., 2].mean(axis=1))
-    rings = PolyCollection(seen[order, :, :2], facecolors=face[order], edgecolors=edge[order], linewidths=0.25)
+    rings = PolyCollection(
+        list(seen[order, :, :2]), facecolors=face[order], edgecolors=edge[order], linewidths=0.25
+    )
     ax.add_collection(rings)
     _others(ax, run, frame, view)
 
@@ -177,11 +176,12 @@ def _others(ax: Axes, run: Run, frame: WakeFrame, view: View) -> None:
 
 def _key(ax: Axes, view: View, width: float, height: float) -> None:
     """Draw the axes of W and a length, as it is seen in the middle of a picture."""
-    size, at = 0.11 * width, np.zeros(2)
+    size = 0.11 * width
     for name, axis in zip("xyz", np.eye(3), strict=True):
-        tip = at + size * np.array([axis @ view.right, axis @ view.up])
-        ax.annotate("", tip, at, arrowprops={"arrowstyle": "-|>", "linewidth": 0.9, "color": INK, "shrinkA": 0.0})
-        ax.text(*(at + 1.25 * (tip - at)), name, ha="center", va="center", color=INK)
+        x, y = size * float(axis @ view.right), size * float(axis @ view.up)
+        arrow = {"arrowstyle": "-|>", "linewidth": 0.9, "color": INK, "shrinkA": 0.0}
+        ax.annotate("", (x, y), (0.0, 0.0), arrowprops=arrow)
+        ax.text(1.25 * x, 1.25 * y, name, ha="center", va="center", color=INK)
     unit = 10.0 ** np.floor(np.log10(0.4 * width))
     length = unit * max(step for step in (1, 2, 5) if step * unit <= 0.4 * width)
     y = -0.32 * height

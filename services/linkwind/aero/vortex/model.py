@@ -20,7 +20,9 @@ from linkwind.spatial import Array, Motion, Wrench
 
 _log = logging.getLogger("linkwind")
 
-_MEMORY = struct.Struct("<dq")  # time of the last accepted state, bytes of the frame that is still to be shown
+_MEMORY = struct.Struct(
+    "<dq"
+)  # time of the last accepted state, bytes of the frame that is still to be shown
 
 
 class Vortex:
@@ -70,7 +72,9 @@ class Vortex:
             self._solve(t, motion, pose, twist)
         lattice, step = self._made(t, motion), round(t / self._h)
         shown = self._every and step % self._every == 0
-        corner, strength = (part.astype(np.float32) for part in lattice.wake)  # as they are at t, before they go
+        corner, strength = (
+            part.astype(np.float32) for part in lattice.wake
+        )  # as they are at t, before they go
         lattice.commit(t, pose, twist)
         self._due = self._frame(step, corner, strength) if shown else None
         self._committed = t
@@ -96,7 +100,7 @@ class Vortex:
         return due
 
     def save(self) -> bytes:
-        """Return wakes, strengths, trailing edges and the frame that is due, as committed; empty before that."""
+        """Return wakes, strengths, trailing edges, and the frame that is due; empty before any motion."""
         if self._lattice is None or math.isnan(self._committed):
             return b""
         due = b"" if self._due is None else self._due.encode()
