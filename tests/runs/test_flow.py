@@ -16,7 +16,7 @@ from linkwind.bus.base import DynamicsLink
 from linkwind.bus.zenoh import ZenohDynamicsLink, ZenohProviderLink, loopback_endpoint
 from linkwind.dynamics.recorder import Recorder
 from linkwind.dynamics.service import DynamicsService
-from linkwind.frames import decode
+from linkwind.frames import Sent, decode
 from linkwind.log import grid
 from linkwind.log.export import export_csv
 from linkwind.log.reader import open_log
@@ -176,6 +176,6 @@ def test_a_replay_shows_the_frames_as_they_were_sent(log: Path) -> None:
         replay(opened, Selection(), listen=[endpoint], connect=[], steering=Steering(0.0))
         assert subscriber.done.wait(60.0)
     assert {key for key, _ in subscriber.got} == {"linkwind/v1/run/observe/flow/aero"}
-    got = [decode(payload, "run", "aero") for _, payload in subscriber.got]
+    got = [decode(Sent("flow", payload), "run", "aero") for _, payload in subscriber.got]
     assert [number for number, _ in got] == [1, 2, 3, 4]
     assert all(equal(frame, once) for (_, frame), once in zip(got, opened.frames("aero"), strict=True))
