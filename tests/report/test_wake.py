@@ -121,7 +121,7 @@ def test_the_gallery_shows_the_wakes_and_says_what_is_seen(page):
     assert "Wakes" in page.texts["figure"]
     caption = page.texts["figcaption"]
     assert "t = 0.010, 0.020, 0.030, 0.040 s" in caption
-    assert "right_wing and left_wing and tail" in caption
+    assert "right_wing, left_wing and tail" in caption
     assert f"the last {KEPT} rows, 0.015 s" in caption
     assert "The log holds 5 frames." in caption
     source = next(value for name, value in page.attributes if name == "src")
@@ -132,6 +132,12 @@ def test_the_gallery_shows_the_wakes_and_says_what_is_seen(page):
     assert max(red, blue) > 0.002  # rings in colour
     assert (drawn.max(axis=1) < 90).mean() > 0.001  # dark wings
     assert (drawn.min(axis=1) > 250).mean() < 0.97  # not empty
+
+
+def test_the_page_says_what_is_between_two_frames(run):
+    said = "Between two frames of the wakes their lines go straight."
+    assert said in render(run)
+    assert said not in render(dataclasses.replace(run, wakes=()))
 
 
 def test_wakes_are_seen_in_space_and_a_run_without_has_none(run, page):

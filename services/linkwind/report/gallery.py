@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Sequence
 from html import escape
 
 from linkwind.report.data import Run
@@ -44,6 +45,11 @@ def _reynolds(run: Run, provider: str) -> float | None:
     return float(of_a_cell.max()) * float(settings["flow"]["cells"])
 
 
+def _listed(names: Sequence[str]) -> str:
+    *others, last = names
+    return f"{', '.join(others)} and {last}" if others else last
+
+
 def _round(value: float) -> str:
     return f"{float(f'{value:.2g}'):,.0f}"
 
@@ -81,18 +87,14 @@ def _wake(run: Run, wake: Wake) -> str:
     if settings["model"] == "vortex":
         rows, step = settings["vortex"]["wake"], float(run.scenario["coupling"]["step"])
         kept = f"A wake holds the last {rows} rows, {number(rows * step)} s. "
-    wings = (
-        " and ".join(settings["bodies"])
-        if len(settings["bodies"]) < 4
-        else f"{len(settings['bodies'])} wings"
-    )
+    wings = _listed(settings["bodies"]) if len(settings["bodies"]) < 4 else f"{len(settings['bodies'])} wings"
     scale = f"±{number(wake.circulation)} m²/s"
     alternative = (
         f"Surfaces of vortex rings behind {wings} at t = {when} s, coloured by circulation, {scale}."
     )
     caption = (
-        f"Wakes that {wings} shed, at t = {when} s, all seen from one side and on one scale. Each cell is a "
-        "vortex ring that goes with the fluid; its colour is its circulation, which it keeps: red and blue "
+        f"Wakes that {wings} shed, at t = {when} s, in perspective from one side, on one scale. Each cell is "
+        "a vortex ring that goes with the fluid; its colour is its circulation, which it keeps: red and blue "
         "turn opposite ways, and where it changes from cell to cell there is vorticity. Dark cells are the "
         f"rings on the wings. {kept}The log holds {len(wake.t)} frames."
     )

@@ -78,12 +78,13 @@ def note(run: Run) -> str:
     states, points = len(run.trajectory.t), points_per_curve(run)
     if not states:
         return "The log holds no state of the mechanism: there is nothing to draw."
+    between = "Between two frames of the wakes their lines go straight. " if run.wakes else ""
     if states <= min(FRAMES, points):
-        return f"All {states} states are shown. {_ZOOM}"
+        return f"All {states} states are shown. {between}{_ZOOM}"
     return (
         f"The run has {states} states. The animation shows at most {FRAMES} of them, evenly spread; a curve "
         f"at most {points} points, the smallest and the largest of each interval. The log holds all. "
-        f"{_ZOOM}"
+        f"{between}{_ZOOM}"
     )
 
 
