@@ -1,5 +1,6 @@
 // Wings and their wakes at any time. Between two frames every line of a wake goes straight from where it was to
-// where it will be; one that is shed in between leaves the trailing edge in time.
+// where it will be; one that is shed in between leaves the trailing edge in time. Behind the last frame nothing is
+// known but where lines were shed.
 
 import { indexAt } from "./clock.js";
 import { add, number, turned } from "./motion.js";
@@ -29,6 +30,7 @@ function decoded(frame, motion, bodies) {
 }
 
 const AHEAD = 2; // frames that are loaded before they are due
+const BEHIND = 3; // frames before the one that is due, of which one will do until that is there
 const KEPT = 4000; // trailing edges that are remembered
 
 // The middle of the mechanism and of what it trails; how far they reach from there along the axes, and at all [m].
@@ -44,16 +46,18 @@ export function around(centre, reach, wings) {
 // `wakes` has the times, bodies, step, top, colours, and `frame(i)`, which promises a frame.
 export function makeWake(wakes, motion, repaint) {
   const choice = document.getElementById("wake"), scale = document.getElementById("wake-scale");
-  let shots = [], palette = null, edges = new Map(), shown = null;
+  let palette = null, edges = new Map(), shown = null;
+  const shots = [], coming = new Set();
 
+  // One that is on another scale stays until it is there again.
   function load(i) {
-    if (i in shots || i < 0 || i >= wakes.times.length) return;
-    const all = shots;
-    all[i] = null;
+    const { top } = wakes;
+    if (i < 0 || i >= wakes.times.length || coming.has(i) || shots[i]?.top === top) return;
+    coming.add(i);
     wakes.frame(i).then((frame) => {
-      all[i] = decoded(frame, motion, wakes.bodies);
-      if (all === shots) repaint();
-    }).catch(() => { delete all[i]; }); // tried again with the next picture
+      shots[i] = { ...decoded(frame, motion, wakes.bodies), top };
+      repaint();
+    }).catch(() => {}).finally(() => coming.delete(i)); // tried again with the next picture
   }
 
   // The trailing edge of a wing at the time of a step.
@@ -79,9 +83,9 @@ export function makeWake(wakes, motion, repaint) {
     if (!next) for (let step = last; step <= newest; step++) if (step % stride === 0 || step === newest) steps.add(step);
     const both = [...before.keys()].filter((step) => after.has(step)).pop(); // the oldest one that is in both
     const drift = both == null ? null : before.get(both).line.map((p, j) => minus(after.get(both).line[j], p));
-    const still = shot.wings[wing].rows.at(-1);
+    const unknown = new Int8Array(shot.columns);
     return [...steps].filter((step) => step <= newest && step >= oldest).sort((a, b) => b - a).map((step) => {
-      const from = before.get(step), to = after.get(step), row = (from ?? to)?.row ?? still;
+      const from = before.get(step), to = after.get(step), row = (from ?? to)?.row ?? unknown;
       if (from && to) return { row, line: from.line.map((p, j) => blend(p, to.line[j], f)) };
       if (from) return { row, line: drift ? from.line.map((p, j) => add(p, drift[j].map((x) => f * x))) : from.line };
       const shed = trailing(shot, wing, step), since = step * wakes.step;
@@ -110,10 +114,12 @@ export function makeWake(wakes, motion, repaint) {
       const i = indexAt(wakes.times, t + 1e-9);
       if (!choice.checked || !(wakes.times[i] <= t + 1e-9)) return null;
       for (let k = i; k <= i + AHEAD; k++) load(k);
-      const shot = shots[i], now = motion.poses(t);
+      let last = i;
+      while (last > i - BEHIND && !shots[last]) last--;
+      const shot = shots[last], now = motion.poses(t);
       if (!shot || !palette) return shown; // until it is there
       return (shown = wakes.bodies.map((_, wing) => {
-        const wake = wakeAt(shot, shots[i + 1], wing, t);
+        const wake = wakeAt(shot, shots[last + 1], wing, t);
         const own = Array.from({ length: shot.bound + 1 }, (_, edge) => placed(shot, wing, edge, now));
         return {
           bound: shot.bound,
@@ -127,7 +133,6 @@ export function makeWake(wakes, motion, repaint) {
     get colours() { return palette; },
     // Goes on with more frames, which may be on another scale.
     update(more) {
-      if (more.top !== wakes.top) shots = [];
       wakes = more;
       show();
     },

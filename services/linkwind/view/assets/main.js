@@ -171,7 +171,9 @@ async function update(news) {
   if (poses && view) view.poses.append(poses);
   playbar.show();
   tell();
-  await load();
+  const loading = load();
+  await trail(); // frames are there sooner than all of the recording
+  await loading;
   await reel();
   await trail();
 }
