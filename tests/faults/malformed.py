@@ -19,7 +19,7 @@ import numpy as np
 
 from linkwind.checkpoints import Checkpoint
 from linkwind.errors import ParticipantError, SimulationError
-from linkwind.frames import FlowFrame, Sent
+from linkwind.frames import FlowFrame, Sent, WakeFrame
 from linkwind.messages import MotionMessage, WrenchMessage
 from linkwind.protocol import DynamicsSession, ProviderSession, ProviderState, fault, fault_error
 from linkwind.schema import MESSAGES, SHA256
@@ -39,6 +39,9 @@ def good() -> dict[str, bytes]:
         1, 1_000_000, (0.0, 0.0), 0.1,
         np.zeros((4, 4, 2), np.float32), np.zeros((4, 4), np.float32), np.zeros((4, 4), np.float32),
     )  # fmt: skip
+    wake = WakeFrame(
+        1, 1_000_000, 1, np.zeros((2, 4, 3, 3), np.float32), np.zeros((2, 3, 2), np.float32)
+    )  # fmt: skip
     control = MESSAGES["Control"]
     hello = {"name": "aero", "schema_sha256": SHA256, "version": "0", "instance": "x"}
     welcome = {
@@ -49,6 +52,7 @@ def good() -> dict[str, bytes]:
         "motion": motion.payload(),
         "wrench": wrench.payload(),
         "frame": frame.encode(RUN, "aero", 1),
+        "wake": wake.encode(RUN, "aero", 1),
         "checkpoint": Checkpoint(1, 1_000_000, b"memory").encode(RUN, "aero", 1),
         "hello": control(hello=hello).SerializeToString(),
         "ready": control(ready={"name": "aero", "instance": "x", "kind": 1}).SerializeToString(),
@@ -159,6 +163,8 @@ class Ends:
             return "dropped"
         if kind == "frame":
             dynamics.frame("aero", Sent("flow", payload))
+        elif kind == "wake":
+            dynamics.frame("aero", Sent("wake", payload))
         elif kind == "checkpoint":
             dynamics.checkpoint("aero", payload)
         elif kind == "welcome":
