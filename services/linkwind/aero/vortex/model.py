@@ -20,9 +20,7 @@ from linkwind.spatial import Array, Motion, Wrench
 
 _log = logging.getLogger("linkwind")
 
-_MEMORY = struct.Struct(
-    "<dq"
-)  # time of the last accepted state, bytes of the frame that is still to be shown
+_MEMORY = struct.Struct("<dq")  # time of the last accepted state, bytes of the frame still to be shown
 
 
 class Vortex:
@@ -72,11 +70,9 @@ class Vortex:
             self._solve(t, motion, pose, twist)
         lattice, step = self._made(t, motion), round(t / self._h)
         shown = self._every and step % self._every == 0
-        corner, strength = (
-            part.astype(np.float32) for part in lattice.wake
-        )  # as they are at t, before they go
+        wake = [part.astype(np.float32) for part in lattice.wake] if shown else []  # before it goes on
         lattice.commit(t, pose, twist)
-        self._due = self._frame(step, corner, strength) if shown else None
+        self._due = self._frame(step, *wake) if shown else None
         self._committed = t
 
     def evaluate(self, t: float, motion: Motion, wrench: Wrench) -> None:
