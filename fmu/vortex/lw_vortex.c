@@ -253,28 +253,58 @@ static void steady_wrench(const lw_vortex *v, const double *pose, const double *
     }
 }
 
-/* Add what a change of the strengths in a step does, -rho S d gamma / dt, to wrench (n, 6): a pressure on the
- * panels, a quarter of which lies in front of the ring. */
-static void unsteady_wrench(const lw_vortex *v, const double *pose, const double *change, double *wrench) {
+/* Middle of a ring, or where the trailing edge itself is: a quarter of a panel in front of the last row. */
+static lw_vec3 middle_of(const double *corner, int32_t row, double behind) {
+    const lw_vec3 ahead = lw_add(lw_load3(corner), lw_load3(corner + 3));
+    const lw_vec3 back = lw_add(lw_load3(corner + row), lw_load3(corner + row + 3));
+    return lw_add(lw_scale(0.5 * (1.0 - behind), ahead), lw_scale(0.5 * behind, back));
+}
+
+/* Area vector of the ring of the wake behind ring j of the trailing edge, which the fluid leaves along the plate:
+ * that along the area vector of the ring before. */
+static lw_vec3 shed_area(const lw_vortex *v, int32_t b, int32_t j, const double *edge, lw_vec3 before) {
+    if (v->rows == 0) return lw_vec(0.0, 0.0, 0.0);
+    const double *wake = v->wake + 3 * (b * (v->spanwise + 1) + j);
+    const lw_vec3 down = lw_sub(lw_load3(wake + 3), lw_load3(edge));
+    const lw_vec3 up = lw_sub(lw_load3(wake), lw_load3(edge + 3));
+    return lw_scale(0.5 * lw_dot(lw_cross(down, up), before) / lw_dot(before, before), before);
+}
+
+/* Write what a change of the strengths in a step does, bodies as at its end, to wrench (n, 6): -rho S d gamma / dt
+ * on each ring; and as much on the vorticity that leaves the trailing edge in the step and lies on the plate for
+ * half of it, +rho / 2 S d gamma / dt with S of the wake's first ring. So the wrench is what the rings' impulse
+ * loses, and of second order. */
+static void press(const lw_vortex *v, const double *pose, const double *change, double *wrench) {
     const sizes z = sizes_of(v);
     const int32_t s = v->spanwise, row = 3 * (s + 1);
+    fill(wrench, (size_t)z.columns);
     for (int32_t ring = 0; ring < v->surfaces * z.rings; ++ring) {
         const int32_t b = ring / z.rings, k = ring % z.rings;
         const double *corner = v->placed + 3 * b * z.corners + k / s * row + 3 * (k % s);
-        const lw_vec3 ahead = lw_add(lw_load3(corner), lw_load3(corner + 3));
-        const lw_vec3 behind = lw_add(lw_load3(corner + row), lw_load3(corner + row + 3));
-        const lw_vec3 arm = lw_sub(lw_add(lw_scale(0.375, ahead), lw_scale(0.125, behind)), lw_load3(pose + 7 * b));
-        const lw_vec3 area = lw_load3(v->normal + 3 * ring);
-        add_wrench(wrench + 6 * b, lw_scale(-v->density / v->step * change[ring], area), arm);
+        const lw_vec3 centre = lw_load3(pose + 7 * b), area = lw_load3(v->normal + 3 * ring);
+        const double rate = v->density / v->step * change[ring];
+        add_wrench(wrench + 6 * b, lw_scale(-rate, area), lw_sub(middle_of(corner, row, 0.5), centre));
+        if (k < z.rings - s) continue;
+        const lw_vec3 shed = shed_area(v, b, k % s, corner + row, area);
+        add_wrench(wrench + 6 * b, lw_scale(0.5 * rate, shed), lw_sub(middle_of(corner, row, 0.75), centre));
+    }
+}
+
+/* Add to wrench (6) what half a step of turning with this rate [rad/s] takes from another. */
+static void turn_back(const lw_vortex *v, lw_vec3 rate, const double *other, double *wrench) {
+    for (int part = 0; part < 6; part += 3) {
+        const lw_vec3 gained = lw_scale(0.5 * v->step, lw_cross(rate, lw_load3(other + part)));
+        lw_store3(wrench + part, lw_sub(lw_load3(wrench + part), gained));
     }
 }
 
 /* Derivatives of the wrenches by one component of the twist of a body: of the steady part, (n, 6), and all
  * of the mean over the step, less, in one column of the response. */
-static void respond(lw_vortex *v, const lw_points *targets, const double *pose, int32_t column,
-                    double *response) {
+static void respond(lw_vortex *v, const lw_points *targets, const double *pose, const double *twist,
+                    int32_t column, double *response) {
     const sizes z = sizes_of(v);
     const int32_t rings = v->surfaces * z.rings, body = column / 6;
+    const lw_vec3 zero = {0.0, 0.0, 0.0};
     const double *strength = v->by_twist + (size_t)column * rings;
     double *velocity[3], *steady = v->steady_by_twist + (size_t)column * z.columns;
     for (int axis = 0; axis < 3; ++axis) velocity[axis] = v->change + (size_t)axis * z.targets;
@@ -289,10 +319,15 @@ static void respond(lw_vortex *v, const lw_points *targets, const double *pose, 
     fill(steady, (size_t)z.columns);
     steady_wrench(v, pose, strength, targets->at, targets->velocity, steady);
     steady_wrench(v, pose, v->trial_strength, targets->at, velocity, steady);
-    fill(v->row, (size_t)z.columns);
-    unsteady_wrench(v, pose, strength, v->row);
-    for (int32_t k = 0; k < z.columns; ++k)
-        response[(size_t)k * z.columns + column] = -(0.5 * steady[k] + v->row[k]);
+    press(v, pose, strength, v->pressed);
+    for (int32_t k = 0; k < z.columns; ++k) v->row[k] = 0.5 * steady[k] + v->pressed[k];
+    for (int32_t b = 0; b < v->surfaces; ++b)
+        turn_back(v, lw_load3(twist + 6 * b + 3), v->pressed + 6 * b, v->row + 6 * b);
+    if (v->started && column % 6 >= 3) {
+        press(v, pose, v->gained, v->pressed);
+        turn_back(v, unit_velocity(column % 3, zero), v->pressed + 6 * body, v->row + 6 * body);
+    }
+    for (int32_t k = 0; k < z.columns; ++k) response[(size_t)k * z.columns + column] = -v->row[k];
 }
 
 int lw_vortex_evaluate(lw_vortex *v, double t, const double *pose, const double *twist, double *wrench,
@@ -311,9 +346,12 @@ int lw_vortex_evaluate(lw_vortex *v, double t, const double *pose, const double 
         wrench[k] = v->started ? 0.5 * (v->steady[k] + v->trial_steady[k]) : v->trial_steady[k];
     if (v->started) {
         for (int32_t k = 0; k < rings; ++k) v->gained[k] = v->trial_strength[k] - v->strength[k];
-        unsteady_wrench(v, pose, v->gained, wrench);
+        press(v, pose, v->gained, v->pressed);
+        for (int32_t k = 0; k < z.columns; ++k) wrench[k] += v->pressed[k];
+        for (int32_t b = 0; b < v->surfaces; ++b)
+            turn_back(v, lw_load3(twist + 6 * b + 3), v->pressed + 6 * b, wrench + 6 * b);
     }
-    for (int32_t column = 0; column < z.columns; ++column) respond(v, &targets, pose, column, response);
+    for (int32_t column = 0; column < z.columns; ++column) respond(v, &targets, pose, twist, column, response);
     for (int32_t k = 0; k < z.columns; ++k) v->trial_twist[k] = twist[k];
     return 0;
 }

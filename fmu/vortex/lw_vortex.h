@@ -48,7 +48,8 @@ typedef struct {
     double *influence;        /* (n c s, 3, lw_vortex_targets): velocity by each ring, an axis after the other */
     double *matrix, *pivots;  /* (n c s, n c s); (n c s) */
     double *change;           /* (3, lw_vortex_targets) by a component of the twist: velocity at the targets */
-    double *gained, *row;     /* (n c s) strengths in a step; (6 n) */
+    double *gained;           /* (n c s) strengths in a step */
+    double *pressed, *row;    /* (6 n) wrench by that, and a column of the response */
 } lw_vortex;
 
 /* Before everything else. */

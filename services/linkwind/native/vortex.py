@@ -59,6 +59,7 @@ _ROOM = (
     "pivots",
     "change",
     "gained",
+    "pressed",
     "row",
 )
 
@@ -130,6 +131,7 @@ class VortexLattice:
             "pivots": np.zeros(n * c * s),
             "change": np.zeros((3, targets)),
             "gained": np.zeros((n, c, s)),
+            "pressed": np.zeros((n, 6)),
             "row": np.zeros((n, 6)),
         }
         for name, array in self._arrays.items():
