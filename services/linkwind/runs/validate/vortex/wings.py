@@ -1,0 +1,159 @@
+"""Wings of finite span: steady lift and drag, added mass, and the impulse of the wake."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from linkwind.aero.vortex import Vortex
+from linkwind.runs.validate.driven import Driven
+from linkwind.runs.validate.rows import Curve, Findings, Plot, Row, most
+from linkwind.runs.validate.vortex import surface
+from linkwind.runs.validate.vortex.scenes import SPAN, WIDTH, wing
+from linkwind.spatial import Array
+
+TUCK = "E. O. Tuck, J. Austral. Math. Soc. B 35(2), 1993"
+OWN = "a lattice written apart, spaced by cosines"
+DNV = "DNV-RP-C205, rectangular plates"
+EXACT = "exact"
+
+SLOPES = {1.0: 1.4602, 2.0: 2.4744}  # of the lift coefficient [1/rad], published
+INCIDENCE = 0.02  # rad
+COARSE = {1.0: (8, 16), 2.0: (8, 16), 4.0: (8, 24), 8.0: (8, 32), 20.0: (6, 48)}  # rings, by aspect ratio
+ADDED = {1.0: 0.579, 2.0: 0.757}  # over pi/4 times density, chord² and span, by span over chord
+
+
+def steady(short: bool) -> Findings:
+    """Rectangular wings in a stream, long after the start: slope of the lift, and induced drag."""
+    start, rows, curve = time.perf_counter(), [], []
+    for aspect, rings in COARSE.items():
+        if short and aspect not in (1.0, 8.0):
+            continue
+        slope, drag = _steady(aspect, rings)
+        right, factor = surface.wing(aspect)
+        case = f"wing of aspect ratio {aspect:g}, {rings[0]} × {rings[1]} rings"
+        curve.append((aspect, slope, drag, right, factor))
+        for published in [SLOPES[aspect]] if aspect in SLOPES else []:
+            rows.append(Row(case, "slope of the lift [1/rad]", slope, published, 0.005, TUCK))
+        rows += [
+            Row(case, "slope of the lift [1/rad]", slope, right, 0.005, OWN),
+            Row(case, "induced drag over that of an elliptic lift", drag, factor, 0.005, OWN),
+        ]
+    aspects, slopes, drags, right, factors = np.array(curve).T
+    plots = (
+        _plot("slope of the lift [1/rad]", aspects, slopes, right),
+        _plot("induced drag over that of an elliptic lift", aspects, drags, factors),
+    )
+    return Findings(rows, [] if short else list(plots), time.perf_counter() - start)
+
+
+def _plot(what: str, aspects: Array, found: Array, right: Array) -> Plot:
+    curves = (Curve("linkwind", aspects, found), Curve("a lattice written apart", aspects, right, True))
+    return Plot("Rectangular wings", "aspect ratio", what, curves)
+
+
+def _steady(aspect: float, rings: tuple[int, int]) -> tuple[float, float]:
+    """Return slope of the lift and drag over that of an elliptic one, 30 spans after the start."""
+    steps, pose = 30, np.array([0.0, 0.0, -INCIDENCE])
+    driven = Driven(wing(aspect, rings=rings, step=aspect, rows=steps + 1))
+    drag, lift, _ = driven.go(lambda t: (pose, np.zeros(3)), steps).wrench[-1, 0] / (0.5 * aspect)
+    return float(lift / INCIDENCE), float(drag * np.pi * aspect / lift**2)
+
+
+def added(short: bool) -> Findings:
+    """A plate that is suddenly moved along its normal: the impulse that it takes."""
+    start, rows = time.perf_counter(), []
+    for aspect, published, source in ((1.0, ADDED[1.0], DNV), (2.0, ADDED[2.0], DNV), (SPAN, 1.0, EXACT)):
+        counts = (6, 12) if short else (8, 16)
+        coarse, fine = (_added(aspect, count) for count in counts)
+        shape = "in two dimensions" if aspect == SPAN else f"with a span of {aspect:g} chords"
+        case, quantity = f"plate {shape}, moved along its normal", "added mass over π/4 ρ chord² span"
+        rings = f"{counts[1]} rings along the chord"
+        rows += [
+            Row(f"{case}, {rings}", quantity, fine, published, None, source),
+            Row(f"{case}, none too few", quantity, 2.0 * fine - coarse, published, 0.01, source),
+        ]
+    return Findings(rows, [], time.perf_counter() - start)
+
+
+def _added(aspect: float, chordwise: int) -> float:
+    spanwise, speed = (1 if aspect == SPAN else round(chordwise * aspect)), 1.0
+    driven = Driven(wing(aspect, rings=(chordwise, spanwise), step=1e-3, rows=2, wind=0.0))
+
+    def path(t: float) -> tuple[Array, Array]:
+        return np.array([0.0, speed * t, 0.0]), np.array([0.0, speed * (t > 0.0), 0.0])
+
+    impulse = -driven.go(path, 1).wrench[0, 0, 1] * driven.h / speed
+    return float(impulse / (0.25 * np.pi * (WIDTH if aspect == SPAN else aspect)))
+
+
+def impulse(short: bool) -> Findings:
+    """A wing that turns and beats in air at rest: its force against what the impulse of all rings loses."""
+    start, found, errors = time.perf_counter(), Findings(), []
+    counts = (4, 8) if short else (4, 8, 16)
+    for count in counts:
+        t, force, lost = _impulse(count, 3.0)
+        error = float(np.abs(force - lost).max() / np.abs(force).max())
+        errors.append(error)
+    case = f"wing that turns and beats, {counts[-1]} rings along the chord"
+    found.rows.append(
+        most(case, "force and loss of impulse: difference over the largest", errors[-1], 0.02, EXACT)
+    )
+    curves = (Curve("force along y", t, force[:, 1]), Curve("loss of impulse", t, lost[:, 1], True))
+    found.plots = [
+        Plot("A wing that turns and beats", "chords", "force", curves),
+        Plot(
+            "Force and loss of impulse", "rings along the chord", "largest difference",
+            (Curve("linkwind", np.array(counts), np.array(errors)),), "loglog",
+        ),
+    ]  # fmt: skip
+    return Findings(found.rows, found.plots, time.perf_counter() - start)
+
+
+def _impulse(chordwise: int, chords: float) -> tuple[Array, Array, Array]:
+    """Return t, the force of each step and the rate at which the rings lose impulse, (steps, 2)."""
+    step = 1.0 / chordwise
+    steps = round(chords / step)
+    driven = Driven(wing(2.0, rings=(chordwise, 2 * chordwise), step=step, rows=steps + 1, wind=0.0))
+    bend, beat, rate, swing = 0.25, 0.2, 2.0, 0.3  # 1/chords of the way, chords, 1/chords, rad
+
+    def path(t: float) -> tuple[Array, Array]:
+        turn = bend * t
+        along = np.array([-np.sin(turn), -(1.0 - np.cos(turn))]) / bend
+        normal, tangent = np.array([-np.sin(turn), np.cos(turn)]), np.array([-np.cos(turn), -np.sin(turn)])
+        y, v = beat * (1.0 - np.cos(rate * t)), beat * rate * np.sin(rate * t)
+        angle, spin = turn - swing * np.sin(rate * t), bend - swing * rate * np.cos(rate * t)
+        place, speed = along + y * normal, tangent * (1.0 + bend * y) + v * normal
+        return np.array([*place, angle]), np.array([*speed, spin])
+
+    kept: list[Array] = []
+    forces = driven.go(path, steps, lambda driven, k: kept.append(_momentum(driven)))
+    lost = -np.diff(np.array(kept), axis=0) / driven.h
+    return forces.t[1:], forces.wrench[1:, 0, :2], lost
+
+
+def _momentum(driven: Driven) -> Array:
+    """Return the impulse of all rings as evaluated last, in the plane."""
+    assert isinstance(driven.model, Vortex)
+    lattice = driven.model.lattice
+    corners, strengths = lattice.wake
+    on_wing = (_areas(lattice.surface[0]) * lattice.trial_strength[0][..., None]).sum((0, 1))
+    behind = np.concatenate([lattice.surface[0, -1:], corners[:, 0]])
+    in_wake = (_areas(behind) * strengths[:, 0][..., None]).sum((0, 1))
+    found: Array = (on_wing + in_wake)[:2]
+    return found
+
+
+def _areas(corner: Array) -> Array:
+    """Return the area vectors of rings between corners (m + 1, s + 1, 3)."""
+    found: Array = 0.5 * np.cross(corner[1:, 1:] - corner[:-1, :-1], corner[1:, :-1] - corner[:-1, 1:])
+    return found
+
+
+CASES: dict[str, Callable[[bool], Findings]] = {
+    "steady wings": steady,
+    "added mass": added,
+    "impulse": impulse,
+}
