@@ -28,6 +28,7 @@ def register(app: typer.Typer) -> None:
     """Add the commands."""
     group = typer.Typer(no_args_is_help=True, help=HELP)
     group.command()(flow)
+    group.command()(vortex)
     group.command()(multibody)
     group.command()(coupling)
     app.add_typer(group, name="validate")
@@ -50,6 +51,25 @@ def flow(
     from linkwind.runs.validate import FLOW
 
     _validate("flow", FLOW, short, tuple(case or ()), out, as_json)
+
+
+def vortex(
+    short: Annotated[bool, typer.Option("--short", help="Coarser and fewer, some 10 s.")] = False,
+    case: CaseOption = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Folder for vortex.html: the table and plots.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Compare the model vortex with published and exact values; exit code 5 if one is off.
+
+    All of it takes a minute on one core.
+
+    Example: linkwind validate vortex --case flutter --out validation
+    """
+    from linkwind.runs.validate import VORTEX
+
+    _validate("vortex", VORTEX, short, tuple(case or ()), out, as_json)
 
 
 def multibody(

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
-from linkwind.runs.validate import balance, coupling, cylinder, free, multibody, plate
+from linkwind.runs.validate import balance, coupling, cylinder, free, multibody, plate, vortex
 from linkwind.runs.validate.rows import Curve, Findings, Plot, Row
 
-__all__ = ["COUPLING", "FLOW", "MULTIBODY", "Curve", "Findings", "Plot", "Row", "Suite"]
+__all__ = ["COUPLING", "FLOW", "MULTIBODY", "VORTEX", "Curve", "Findings", "Plot", "Row", "Suite"]
 
 
 @dataclass(frozen=True)
@@ -65,4 +65,11 @@ MULTIBODY = Suite(
     "multibody dynamics against published and exact values",
     multibody.CASES,
     remark="Times are those of the steps of the case, in one process that also did other things.",
+)
+
+VORTEX = Suite(
+    "vortex lattice against published and exact values",
+    vortex.CASES,
+    remark="Speed, chord and density are 1, motions are small; the wakes are free, and go one ring's length a "
+    "step where nothing else is said. The theories have no cores: that of the wakes is 0.01 chords.",
 )
