@@ -108,13 +108,33 @@ lw_points lw_vortex_room(const lw_vortex *v, int32_t count) {
     return points;
 }
 
+/* Where the shed vorticity of a step lies at its end, behind the trailing edge: a twelfth of a panel less than a
+ * third of the way that the fluid goes along the plate in a step. At one panel a step that is a quarter of a panel,
+ * as everywhere on the plate; for other steps it is what keeps the lift of second order. From where the edge of the
+ * wake has come to, which was shed there: x = (x + way) / 4 - 1/16. */
+static const double NEAREST = -1.0 / 12.0, FARTHEST = 1.0; /* panels */
+
+static lw_vec3 shed_from(lw_vec3 edge, lw_vec3 panel, const double *wake) {
+    const double behind = lw_dot(lw_sub(lw_load3(wake), edge), panel) / lw_dot(panel, panel);
+    const double place = 0.25 * behind - 0.0625;
+    return lw_add(edge, lw_scale(place < NEAREST ? NEAREST : place > FARTHEST ? FARTHEST : place, panel));
+}
+
 void lw_vortex_place(lw_vortex *v, const double *pose) {
     const sizes z = sizes_of(v);
+    const int32_t across = v->spanwise + 1;
     for (int32_t b = 0; b < v->surfaces; ++b) {
         const lw_vec3 centre = lw_load3(pose + 7 * b);
         const lw_mat3 turn = lw_quat_matrix(lw_load4(pose + 7 * b + 3));
         for (int32_t k = b * z.corners; k < (b + 1) * z.corners; ++k)
             lw_store3(v->placed + 3 * k, lw_add(centre, lw_mat_vec(turn, lw_load3(v->corner + 3 * k))));
+        for (int32_t j = 0; j < across; ++j) {
+            double *last = v->placed + 3 * ((b + 1) * z.corners - across + j);
+            const lw_vec3 panel = lw_sub(lw_load3(last), lw_load3(last - 3 * across));
+            const lw_vec3 edge = lw_sub(lw_load3(last), lw_scale(0.25, panel));
+            lw_store3(v->edge + 3 * (b * across + j), edge);
+            if (v->rows > 0) lw_store3(last, shed_from(edge, panel, v->wake + 3 * (b * across + j)));
+        }
     }
 }
 
@@ -253,12 +273,7 @@ static void steady_wrench(const lw_vortex *v, const double *pose, const double *
     }
 }
 
-/* Middle of a ring, or where the trailing edge itself is: a quarter of a panel in front of the last row. */
-static lw_vec3 middle_of(const double *corner, int32_t row, double behind) {
-    const lw_vec3 ahead = lw_add(lw_load3(corner), lw_load3(corner + 3));
-    const lw_vec3 back = lw_add(lw_load3(corner + row), lw_load3(corner + row + 3));
-    return lw_add(lw_scale(0.5 * (1.0 - behind), ahead), lw_scale(0.5 * behind, back));
-}
+static lw_vec3 middle_of(const double *a, const double *b) { return lw_scale(0.5, lw_add(lw_load3(a), lw_load3(b))); }
 
 /* Area vector of the ring of the wake behind ring j of the trailing edge, which the fluid leaves along the plate:
  * that along the area vector of the ring before. */
@@ -283,10 +298,13 @@ static void press(const lw_vortex *v, const double *pose, const double *change, 
         const double *corner = v->placed + 3 * b * z.corners + k / s * row + 3 * (k % s);
         const lw_vec3 centre = lw_load3(pose + 7 * b), area = lw_load3(v->normal + 3 * ring);
         const double rate = v->density / v->step * change[ring];
-        add_wrench(wrench + 6 * b, lw_scale(-rate, area), lw_sub(middle_of(corner, row, 0.5), centre));
+        const lw_vec3 ahead = middle_of(corner, corner + 3), behind = middle_of(corner + row, corner + row + 3);
+        const lw_vec3 middle = lw_scale(0.5, lw_add(ahead, behind));
+        add_wrench(wrench + 6 * b, lw_scale(-rate, area), lw_sub(middle, centre));
         if (k < z.rings - s) continue;
         const lw_vec3 shed = shed_area(v, b, k % s, corner + row, area);
-        add_wrench(wrench + 6 * b, lw_scale(0.5 * rate, shed), lw_sub(middle_of(corner, row, 0.75), centre));
+        const double *edge = v->edge + 3 * (b * (s + 1) + k % s);
+        add_wrench(wrench + 6 * b, lw_scale(0.5 * rate, shed), lw_sub(middle_of(edge, edge + 3), centre));
     }
 }
 

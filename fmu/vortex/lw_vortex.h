@@ -43,6 +43,7 @@ typedef struct {
 
     /* Room to work in. */
     double *placed, *normal;  /* (n, c + 1, s + 1, 3) corners in W; (n, c, s, 3) area vectors [m^2] */
+    double *edge;             /* (n, s + 1, 3) the trailing edges themselves, in W */
     lw_filament *filaments;   /* of all bodies, then of all wakes: lw_vortex_filaments of them */
     double *points;           /* (6, lw_vortex_points): where, and the velocity there, an axis after the other */
     double *influence;        /* (n c s, 3, lw_vortex_targets): velocity by each ring, an axis after the other */

@@ -52,6 +52,7 @@ _TRIAL = ("trial_twist", "trial_strength", "trial_steady", "by_twist", "steady_b
 _ROOM = (
     "placed",
     "normal",
+    "edge",
     "filaments",
     "points",
     "influence",
@@ -124,6 +125,7 @@ class VortexLattice:
             "steady_by_twist": np.zeros((6 * n, 6 * n)),
             "placed": np.zeros((n, c + 1, s + 1, 3)),
             "normal": np.zeros((n, c, s, 3)),
+            "edge": np.zeros((n, s + 1, 3)),
             "filaments": np.zeros((filaments, 8)),
             "points": np.zeros((6, points)),
             "influence": np.zeros((n * c * s, 3, targets)),
