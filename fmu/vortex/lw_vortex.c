@@ -108,16 +108,15 @@ lw_points lw_vortex_room(const lw_vortex *v, int32_t count) {
     return points;
 }
 
-/* Where the shed vorticity of a step lies at its end, behind the trailing edge: a twelfth of a panel less than a
- * third of the way that the fluid goes along the plate in a step. At one panel a step that is a quarter of a panel,
- * as everywhere on the plate; for other steps it is what keeps the lift of second order. From where the edge of the
- * wake has come to, which was shed there: x = (x + way) / 4 - 1/16. */
-static const double NEAREST = -1.0 / 12.0, FARTHEST = 1.0; /* panels */
-
+/* Where the vorticity that a step sheds lies at its end, in panels behind the trailing edge: 1/3 of the way that the
+ * fluid goes along the plate in a step, less 1/12; so the error of the lift is of first order or better for any way.
+ * At one panel a step that is 1/4, as everywhere on the plate, and the order 2. Without a way it is 0, which gives
+ * the exact added mass, and it is at least -1/3 of a short way. The edge of the wake that was shed there has gone
+ * that way since, so that x = (x + way)/4 - 1/16, or -(x + way)/2. */
 static lw_vec3 shed_from(lw_vec3 edge, lw_vec3 panel, const double *wake) {
-    const double behind = lw_dot(lw_sub(lw_load3(wake), edge), panel) / lw_dot(panel, panel);
-    const double place = 0.25 * behind - 0.0625;
-    return lw_add(edge, lw_scale(place < NEAREST ? NEAREST : place > FARTHEST ? FARTHEST : place, panel));
+    const double farthest = 1.0, gone = lw_dot(lw_sub(lw_load3(wake), edge), panel) / lw_dot(panel, panel);
+    const double far = 0.25 * gone - 0.0625, near = -0.5 * gone, most = far > near ? far : near;
+    return lw_add(edge, lw_scale(gone < 0.0 ? 0.0 : most < farthest ? most : farthest, panel));
 }
 
 void lw_vortex_place(lw_vortex *v, const double *pose) {

@@ -70,6 +70,7 @@ MULTIBODY = Suite(
 VORTEX = Suite(
     "vortex lattice against published and exact values",
     vortex.CASES,
-    remark="Speed, chord and density are 1, motions are small; the wakes are free, and go one ring's length a "
-    "step where nothing else is said. The theories have no cores: that of the wakes is 0.01 chords.",
+    remark="Speed, chord and density are 1, motions are small; the wakes are free. Where nothing else is "
+    "said, a plate goes the length of one ring in a step. The theories have no cores: those of the wakes are "
+    "0.01 chords.",
 )

@@ -1,4 +1,4 @@
-"""Thin sections in closed form: what Theodorsen, Garrick, Wagner and Sears found, in units of density, speed, chord.
+"""Thin sections in closed form, by Theodorsen, Garrick, Wagner and Sears; density, speed and chord are 1.
 
 A motion or a force is the real part of an amplitude times exp(i omega t); k = omega / 2 is the reduced
 frequency, on half the chord. Heave and lift are up, pitch and moment nose up about the middle of the chord.
@@ -12,22 +12,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from linkwind.spatial import Array
+
+Complex = NDArray[np.complex128]
 
 HALF = 0.5  # of the chord
 
 
-def bessel_k(order: int, z: Array) -> Array:
+def bessel_k(order: int, z: Array | Complex) -> Complex:
     """Return the modified Bessel function of the second kind of order 0 or 1, Re z >= 0, |z| > 1e-4.
 
     (1 + n) exp(-z) / sqrt(2z) times the integral of exp(-u²) u^2n (1 + u²/2z)^(n - 1/2) over all u, which
     is smooth, so that the trapezoidal rule is right to all digits.
     """
     u = np.arange(-1300, 1301) * 0.005
-    z = np.asarray(z)[..., None]
+    z = np.asarray(z, np.complex128)[..., None]
     integrand = np.exp(-u * u) * u ** (2 * order) * (1.0 + u * u / (2.0 * z)) ** (order - 0.5)
-    found: Array = ((1.0 + order) * np.exp(-z) / np.sqrt(2.0 * z))[..., 0] * integrand.sum(-1) * 0.005
+    found: Complex = ((1.0 + order) * np.exp(-z) / np.sqrt(2.0 * z))[..., 0] * integrand.sum(-1) * 0.005
     return found
 
 
@@ -40,19 +43,19 @@ def _around(integrand: Array) -> Array:
 ANGLE = np.arange(128) * (2.0 * np.pi / 128)
 
 
-def theodorsen(k: Array | float) -> Array:
+def theodorsen(k: Array | complex) -> Complex:
     """Return C(k), k > 0; k complex where the motion grows or dies down."""
-    z = 1j * np.asarray(k)
-    along: Array = bessel_k(1, z)
-    found: Array = along / (bessel_k(0, z) + along)
+    z = 1j * np.asarray(k, np.complex128)
+    along = bessel_k(1, z)
+    found: Complex = along / (bessel_k(0, z) + along)
     return found
 
 
-def sears(k: Array) -> Array:
+def sears(k: Array) -> Complex:
     """Return S(k), the lift in a travelling gust about the gust at the middle of the chord, 0 < k < 50."""
     k = np.asarray(k, np.float64)
     zero, one = (_around(np.cos(n * ANGLE - k[..., None] * np.sin(ANGLE))) for n in (0, 1))
-    found: Array = theodorsen(k) * (zero - 1j * one) + 1j * one
+    found: Complex = theodorsen(k) * (zero - 1j * one) + 1j * one
     return found
 
 
@@ -62,7 +65,7 @@ def wagner(s: Array) -> Array:
     low, high = np.log(1.1e-4), np.log(30.0)
     x = np.exp(0.5 * (high + low) + 0.5 * (high - low) * nodes)
     bessel_i = (_around(np.exp(x[:, None] * np.cos(ANGLE)) * np.cos(n * ANGLE)) for n in (0, 1))
-    below = (bessel_k(0, x) - bessel_k(1, x)) ** 2 + np.pi**2 * sum(bessel_i) ** 2
+    below = (bessel_k(0, x) - bessel_k(1, x)).real ** 2 + np.pi**2 * sum(bessel_i) ** 2
     decay = np.exp(-np.outer(s, x))
     found: Array = 1.0 - 1.1e-4 - 0.5 * (high - low) * (decay / (x * below)) @ weights
     return found
@@ -77,8 +80,8 @@ class Loads:
     thrust: float
 
 
-def loads(k: float, heave: complex, pitch: complex) -> Loads:
-    """Return what the fluid does to a section that heaves [chords] and pitches [rad]."""
+def loads(k: complex, heave: complex, pitch: complex) -> Loads:
+    """Return what the fluid does to a section that heaves [chords] and pitches [rad]; thrust, for real k."""
     b, s, deficiency = HALF, 2j * k, complex(theodorsen(k))
     rate = s * pitch
     wash = -s * heave + pitch + 0.5 * b * rate  # at three quarters of the chord
@@ -96,8 +99,7 @@ def gust_lift(gust: Array, step: float) -> Array:
         gust: upward, periodic [speeds], shape (m,).
         step: [chords] flown between two of them, above 0.07.
     """
-    omega = 2.0 * np.pi * np.fft.rfftfreq(len(gust), step)
-    response = np.full(len(omega), 2.0 * np.pi * HALF, complex)
-    response[1:] *= sears(omega[1:] * HALF)
+    k = np.asarray(2.0 * np.pi * HALF * np.fft.rfftfreq(len(gust), step), np.float64)
+    response = 2.0 * np.pi * HALF * np.concatenate([[1.0], sears(k[1:])])
     found: Array = np.fft.irfft(np.fft.rfft(gust) * response, len(gust))
     return found

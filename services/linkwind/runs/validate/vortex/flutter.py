@@ -1,4 +1,4 @@
-"""A section on two springs in a stream: whole runs, strongly coupled, against Theodorsen's speed of flutter."""
+"""A section on two springs in a stream: whole runs, strongly coupled, against Theodorsen's flutter."""
 
 from __future__ import annotations
 
@@ -180,10 +180,18 @@ class Trial:
 
 
 AIR = Trial(
-    Section("section of 20 added masses", 20.0, -0.2, 1.0, 0.0, 0.6), (1.25, 0.94), 0.05, (6, 12), (0.01, 0.01)
+    Section("section of 20 added masses", 20.0, -0.2, 1.0, 0.0, 0.6),
+    (1.25, 0.94),
+    0.05,
+    (6, 12),
+    (0.01, 0.01),
 )
 WATER = Trial(
-    Section("section of 0.4 added masses", 0.4, 0.0, 0.1, 0.55, 0.2), (0.35, 0.93), 0.10, (12, 24), (0.05, 0.02)
+    Section("section of 0.4 added masses", 0.4, 0.0, 0.1, 0.55, 0.2),
+    (0.35, 0.93),
+    0.10,
+    (12, 24),
+    (0.05, 0.02),
 )
 
 
@@ -229,10 +237,10 @@ def _flutter(trial: Trial, short: bool) -> Findings:
     paths = [flown(section.scenario(share * speed, frequency, rings, "pec")) for share in shares.tolist()]
     rates = np.array([growth(path.t, heave_of(path)) for path in paths])
     neutral = float(np.interp(0.0, rates.real, shares))
-    case = f"{section.name}, {rings} rings along the chord"
+    case, off = f"{section.name}, {rings} rings along the chord", f"{trial.around:.0%}"
     rows = [
-        most(case, f"growth per radian {trial.around:.0%} below flutter", rates[0].real / frequency, 0.0, EXACT),
-        most(case, f"decay per radian {trial.around:.0%} above", -rates[2].real / frequency, 0.0, EXACT),
+        most(case, f"growth per radian {off} below flutter", rates[0].real / frequency, 0.0, EXACT),
+        most(case, f"decay per radian {off} above it", -rates[2].real / frequency, 0.0, EXACT),
         Row(case, "speed of flutter over the exact one", neutral, 1.0, within, THEODORSEN),
         Row(
             case, "its frequency over the exact one",

@@ -11,7 +11,7 @@ import numpy as np
 
 
 def wing(aspect: float, along: int = 10, across: int = 40) -> tuple[float, float]:
-    """Return the slope of the lift coefficient [1/rad], and the induced drag over that of an elliptic lift."""
+    """Return the slope of the lift [1/rad], and the induced drag over that of an elliptic lift."""
     n, m, k = along, across, np.arange(1, along + 1)
     angle = (k - 0.5) * np.pi / n
     bound, weight = 0.5 * (1.0 - np.cos(angle)), 0.5 * np.pi / n * np.sin(angle)
