@@ -63,7 +63,7 @@ def vortex(
 ) -> None:
     """Compare the model vortex with published and exact values; exit code 5 if one is off.
 
-    All of it takes a minute on one core.
+    All of it takes half a minute on one core.
 
     Example: linkwind validate vortex --case flutter --out validation
     """
