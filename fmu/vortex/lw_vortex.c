@@ -108,11 +108,11 @@ lw_points lw_vortex_room(const lw_vortex *v, int32_t count) {
     return points;
 }
 
-/* Where the vorticity that a step sheds lies at its end, in panels behind the trailing edge: 1/3 of the way that the
- * fluid goes along the plate in a step, less 1/12; so the error of the lift is of first order or better for any way.
- * At one panel a step that is 1/4, as everywhere on the plate, and the order 2. Without a way it is 0, which gives
- * the exact added mass, and it is at least -1/3 of a short way. The edge of the wake that was shed there has gone
- * that way since, so that x = (x + way)/4 - 1/16, or -(x + way)/2. */
+/* Where the vorticity that a step sheds lies at its end, x panels behind the trailing edge: a third of the way
+ * that the fluid goes along the plate in a step, less 1/12; so lift is right for long and short ways. For a way
+ * of one panel that is 1/4, as everywhere on the plate. Without a way it is 0, which gives the exact added mass,
+ * and at least -1/3 of a short way. The corner of the wake that was shed at x has gone that way since:
+ * x = (x + way) / 4 - 1/16, or -(x + way) / 2. */
 static lw_vec3 shed_from(lw_vec3 edge, lw_vec3 panel, const double *wake) {
     const double farthest = 1.0, gone = lw_dot(lw_sub(lw_load3(wake), edge), panel) / lw_dot(panel, panel);
     const double far = 0.25 * gone - 0.0625, near = -0.5 * gone, most = far > near ? far : near;
@@ -272,10 +272,12 @@ static void steady_wrench(const lw_vortex *v, const double *pose, const double *
     }
 }
 
-static lw_vec3 middle_of(const double *a, const double *b) { return lw_scale(0.5, lw_add(lw_load3(a), lw_load3(b))); }
+static lw_vec3 middle_of(const double *a, const double *b) {
+    return lw_scale(0.5, lw_add(lw_load3(a), lw_load3(b)));
+}
 
-/* Area vector of the ring of the wake behind ring j of the trailing edge, which the fluid leaves along the plate:
- * that along the area vector of the ring before. */
+/* Area vector of the ring of the wake behind ring j of the trailing edge, as far as it is along that of the ring
+ * before: the fluid leaves the plate tangentially. */
 static lw_vec3 shed_area(const lw_vortex *v, int32_t b, int32_t j, const double *edge, lw_vec3 before) {
     if (v->rows == 0) return lw_vec(0.0, 0.0, 0.0);
     const double *wake = v->wake + 3 * (b * (v->spanwise + 1) + j);
@@ -284,10 +286,9 @@ static lw_vec3 shed_area(const lw_vortex *v, int32_t b, int32_t j, const double 
     return lw_scale(0.5 * lw_dot(lw_cross(down, up), before) / lw_dot(before, before), before);
 }
 
-/* Write what a change of the strengths in a step does, bodies as at its end, to wrench (n, 6): -rho S d gamma / dt
- * on each ring; and as much on the vorticity that leaves the trailing edge in the step and lies on the plate for
- * half of it, +rho / 2 S d gamma / dt with S of the wake's first ring. So the wrench is what the rings' impulse
- * loses, and of second order. */
+/* Write what a change of the strengths in a step does to wrench (n, 6), with the bodies as at its end: on each ring
+ * -rho S d gamma / dt; and at the trailing edge +rho / 2 S d gamma / dt with S of the wake's first ring, for what
+ * leaves the edge has been on the plate for half of the step. So wrench is what the impulse of all rings loses. */
 static void press(const lw_vortex *v, const double *pose, const double *change, double *wrench) {
     const sizes z = sizes_of(v);
     const int32_t s = v->spanwise, row = 3 * (s + 1);
@@ -297,7 +298,8 @@ static void press(const lw_vortex *v, const double *pose, const double *change, 
         const double *corner = v->placed + 3 * b * z.corners + k / s * row + 3 * (k % s);
         const lw_vec3 centre = lw_load3(pose + 7 * b), area = lw_load3(v->normal + 3 * ring);
         const double rate = v->density / v->step * change[ring];
-        const lw_vec3 ahead = middle_of(corner, corner + 3), behind = middle_of(corner + row, corner + row + 3);
+        const lw_vec3 ahead = middle_of(corner, corner + 3);
+        const lw_vec3 behind = middle_of(corner + row, corner + row + 3);
         const lw_vec3 middle = lw_scale(0.5, lw_add(ahead, behind));
         add_wrench(wrench + 6 * b, lw_scale(-rate, area), lw_sub(middle, centre));
         if (k < z.rings - s) continue;

@@ -88,7 +88,11 @@ def _added(aspect: float, chordwise: int) -> float:
 
 
 def impulse(short: bool) -> Findings:
-    """A wing that turns and beats in air at rest: its force against what the impulse of all rings loses."""
+    """A wing that turns and beats in air at rest: its force against what the impulse of all rings loses.
+
+    What is left does not fall with the rings: corners that are carried on one by one do not keep the impulse
+    of a wake that rolls up.
+    """
     start, found, errors = time.perf_counter(), Findings(), []
     counts = (4, 8) if short else (4, 8, 16)
     for count in counts:
