@@ -67,16 +67,16 @@ def test_no_frames_are_shown_that_are_not_wanted() -> None:
 
 
 def test_wing_and_wake_are_where_they_are_at_one_time() -> None:
-    """All wings go ahead as one: a wake begins on the edge, its first line one step of flight behind it."""
+    """All wings go ahead as one: a wake begins where rings end, its first line one step of flight behind."""
     model, of = made(30)
     frames = fly(model, of, range(12))
-    for frame in frames[1:]:
+    for frame in frames[5:]:  # where rings end follows the speed, from a start without a wake
         edge, behind = frame.corner[:, 2], frame.corner[:, 3]
         left = np.array([SPEED * STEP, 0.0, 0.0])
         # What the fluid adds in a step is a small part of the speed of flight.
         assert np.linalg.norm(edge - left - behind, axis=-1).max() < 0.2 * SPEED * STEP
         moved = np.array([SPEED * frame.time_ns / 1e9, 0.0, 0.0])
-        np.testing.assert_allclose(frame.corner[:, :3] - moved, frames[0].corner[:, :3], atol=1e-6)
+        np.testing.assert_allclose(frame.corner[:, :2] - moved, frames[0].corner[:, :2], atol=1e-6)
 
 
 def test_a_line_of_the_wake_goes_with_the_fluid_and_its_rings_keep_their_strength() -> None:

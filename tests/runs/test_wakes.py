@@ -81,8 +81,9 @@ def test_a_wing_s_rings_lie_on_its_plate(log: Path) -> None:
                 [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
             ])  # fmt: skip
             own = (frame.corner[wing, :3] - path.position[frame.step, body]) @ turn
-            along = np.abs(own[:, 0, 0] / shape["length"])  # panels of 1/2: corners at 1/8, 5/8, 9/8
-            np.testing.assert_allclose(along, [0.375, 0.125, 0.625], atol=2e-6)
+            along = np.abs(own[:, 0, 0] / shape["length"])  # panels of 1/2: corners at 1/8, 5/8, and behind
+            np.testing.assert_allclose(along[:2], [0.375, 0.125], atol=2e-6)
+            assert 0.5 - 0.5 / 24 - 2e-6 < along[2] <= 0.625 + 2e-6  # within a quarter of a panel of the edge
             assert np.abs(own[..., 1]).max() < 1e-6
             assert np.ptp(own[..., 2]) == pytest.approx(shape["span"] * 3 / 3.5, rel=1e-5)
 
