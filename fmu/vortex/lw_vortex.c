@@ -170,6 +170,8 @@ static void influence(lw_vortex *v, const lw_points *targets) {
     const sizes z = sizes_of(v);
     const int32_t rings = v->surfaces * z.rings, size = 3 * z.targets;
     fill(v->influence, (size_t)rings * size);
+    lw_points alone = *targets; /* a filament is too little to share */
+    alone.threads = NULL;
     for (int32_t b = 0; b < v->surfaces; ++b) {
         const double *placed = v->placed + 3 * b * z.corners;
         for (int32_t k = 0; k < z.bearers + v->spanwise; ++k) {
@@ -178,7 +180,7 @@ static void influence(lw_vortex *v, const lw_points *targets) {
             lw_store3(filament.a, lw_load3(placed + 3 * f.from));
             lw_store3(filament.b, lw_load3(placed + 3 * f.to));
             for (int axis = 0; axis < 3; ++axis) fill(targets->velocity[axis], (size_t)targets->count);
-            lw_filaments_add(&filament, 1, targets);
+            lw_filaments_add(&filament, 1, &alone);
             for (int axis = 0; axis < 3; ++axis) {
                 const double *by = targets->velocity[axis];
                 double *with = v->influence + (size_t)f.with * size + axis * z.targets;

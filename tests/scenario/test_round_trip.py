@@ -136,6 +136,8 @@ def test_builtin_names():
         "cylinder",
         "falling_plate",
         "flapper",
+        "flapper_wake",
+        "flutter",
         "four_bar",
         "stage_separation",
         "two_link",
