@@ -165,6 +165,10 @@ static lw_points place_targets(lw_vortex *v, const double *pose) {
 
 /* ---- the flow through the rings ---- */
 
+static void gather(double *to, const double *from, double sign, int32_t count) {
+    for (int32_t k = 0; k < count; ++k) to[k] += sign * from[k];
+}
+
 /* Velocity at the targets by each ring of strength 1. Two rings share most filaments, which are done once. */
 static void influence(lw_vortex *v, const lw_points *targets) {
     const sizes z = sizes_of(v);
@@ -183,10 +187,9 @@ static void influence(lw_vortex *v, const lw_points *targets) {
             lw_filaments_add(&filament, 1, &alone);
             for (int axis = 0; axis < 3; ++axis) {
                 const double *by = targets->velocity[axis];
-                double *with = v->influence + (size_t)f.with * size + axis * z.targets;
-                double *against = v->influence + (size_t)f.against * size + axis * z.targets;
-                for (int32_t i = 0; f.with >= 0 && i < z.targets; ++i) with[i] += by[i];
-                for (int32_t i = 0; f.against >= 0 && i < z.targets; ++i) against[i] -= by[i];
+                if (f.with >= 0) gather(v->influence + (size_t)f.with * size + axis * z.targets, by, 1.0, z.targets);
+                if (f.against >= 0)
+                    gather(v->influence + (size_t)f.against * size + axis * z.targets, by, -1.0, z.targets);
             }
         }
     }
