@@ -3,7 +3,7 @@
 import pytest
 from hypothesis import settings
 
-FLOWS = ("cylinder", "falling_plate", "two_link_flow_free", "vortex_induced_vibration")
+FLOWS = ("cylinder", "falling_plate", "flapper_wake", "two_link_flow_free", "vortex_induced_vibration")
 SLOW = (
     "tests/bus/test_checkpoints.py::test_large",
     "tests/docker/test_stay.py",
@@ -37,6 +37,7 @@ SLOW = (
     "tests/runs/test_resume.py::test_a_flow",
     "tests/runs/test_silent.py::test_one_that_always_hangs",
     "tests/runs/test_silent.py::test_it_is_ended_and_another_one_takes_its_place[-1",
+    "tests/runs/test_validate.py::test_vortex[flutter",
     "tests/scenarios/test_logs.py",
     "tests/scenarios/test_orders.py::test_an_order_over_the_bus",
     "tests/security",
