@@ -15,6 +15,7 @@ import pytest
 import linkwind
 from linkwind.log.export import export_csv
 from linkwind.runs.labels import labels_of
+from linkwind.scenario import builtin_text
 
 README = Path(__file__).parents[1] / "README.md"
 
@@ -48,6 +49,15 @@ def test_editors_and_checkers_know_the_same_names() -> None:
     assert sorted(places) == linkwind.__all__
     for name, (module, attribute) in places.items():
         assert getattr(linkwind, name) is getattr(import_module(str(module)), attribute)
+
+
+def test_a_run_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / "short.toml"
+    text = builtin_text("two_link").replace("end = 1.2", "end = 0.01")
+    file.write_text(text + '[bus]\ntransport = "inprocess"\n', encoding="utf-8")
+    by_name, loaded = (linkwind.run(each, report=False) for each in ("short.toml", linkwind.load(file)))
+    assert by_name.result.final_state_sha256 == loaded.result.final_state_sha256
 
 
 def test_a_run_and_what_programs_do_with_its_log(tmp_path: Path) -> None:

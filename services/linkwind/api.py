@@ -33,7 +33,7 @@ from linkwind.runs import run as running
 from linkwind.runs import verify as verifying
 from linkwind.runs.labels import labels_of
 from linkwind.runs.own import settled
-from linkwind.scenario import Scenario
+from linkwind.scenario import Scenario, load
 
 Models = Mapping[str, Any]
 Progress = Callable[[int], None]
@@ -42,7 +42,7 @@ _NONE: Models = MappingProxyType({})
 
 
 def run(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     out: str | Path | None = None,
     *,
     models: Models = _NONE,
@@ -53,7 +53,7 @@ def run(
     """Run a scenario with every provider on this machine, as ``linkwind run``.
 
     Args:
-        scenario: what to run.
+        scenario: what to run, or what :func:`linkwind.load` takes: a built-in's name or a file.
         out: folder for log and report; None for a new one under ``runs/``.
         models: of the user's own, by provider, see :mod:`linkwind.api`.
         report: make the page of the run.
@@ -65,8 +65,9 @@ def run(
     """
     refuse_while_loading()
     own = _own(models)
-    scenario, _ = settled(_together(scenario, own), own)
-    return running.run(scenario, _path(out), progress, own, _path(tls), report=report)
+    loaded = scenario if isinstance(scenario, Scenario) else load(scenario)
+    complete, _ = settled(_together(loaded, own), own)
+    return running.run(complete, _path(out), progress, own, _path(tls), report=report)
 
 
 def serve(

@@ -72,3 +72,16 @@ def test_wakes_that_are_coarse_or_short(settings: list[str], told: str | None) -
     found = list(doubts(load("flapper", ["aero.model=vortex", *settings])))
     assert len(found) == (told is not None)
     assert all(told in doubt for doubt in found if told)
+
+
+@pytest.mark.parametrize(("frequency", "told"), [(100.0, False), (-300.0, True), (5000.0, True)])
+def test_gusts_that_are_over_in_a_few_steps(frequency: float, told: bool) -> None:
+    """At 1 ms a gust of 300 Hz takes 3.3 steps; 8 of them would be 0.42 ms."""
+    gust = f"environment.gusts=[{{amplitude=[1,0,0],frequency={frequency}}}]"
+    found = list(doubts(load("two_link", [gust])))
+    assert [doubt.startswith("two_link.toml: environment.gusts[0].frequency:") for doubt in found] == [
+        True
+    ] * told
+    if frequency == -300.0:
+        assert "takes 3.3 steps of 0.001 s" in found[0]
+        assert "coupling.step of 0.00042 s or less" in found[0]

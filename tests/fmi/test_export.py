@@ -189,6 +189,17 @@ def invoke(*arguments: str):
     return CliRunner().invoke(app, ["fmu", *map(str, arguments)], env={"COLUMNS": "200"})
 
 
+def test_an_export_says_what_is_not_in_it(tmp_path):
+    for name, part, told in (
+        ("two_link", "dynamics", True),
+        ("two_link", "aero", False),
+        ("four_bar", "dynamics", False),
+    ):
+        done = invoke("export", name, "-o", tmp_path / "some.fmu", "--part", part)
+        assert done.stdout.startswith("wrote ")
+        assert ("The forces of aero are inputs of it" in done.stdout) == told
+
+
 def test_export_command(tmp_path):
     out = tmp_path / "plate.fmu"
     done = invoke("export", "two_link", "-o", out, "--fmi", "3", "--part", "aero", "--json")

@@ -14,12 +14,14 @@ WITHOUT_WIND = ("none", "field")  # models that read no wind from the scenario
 # lattice steps in a communication step; measured on free plates.
 WANTED = ((2, 1.0), (math.inf, 2.0))
 COARSE = 2.0  # panels that a wing goes in a step: above, lift after a sudden change is some percent off
+STEPS_A_GUST = 8.0  # that tell its shape: with fewer, a sine's largest value is missed by 8 % and more
 SHORT = 4.0  # chords: what a shorter wake leaves out is felt
 
 
 def doubts(scenario: Scenario) -> Iterator[str]:
     """Yield what to tell the user before a run, a sentence each; the scenario has been checked."""
     yield from _no_wind(scenario)
+    yield from _gusts_too_short(scenario)
     for provider in scenario.providers:
         if provider.model == "flow":
             yield from _too_light(scenario, provider)
@@ -35,6 +37,18 @@ def _no_wind(scenario: Scenario) -> Iterator[str]:
             f"{scenario.source}: environment: the wind moves nothing here: a field is what its expressions "
             "say. Write the wind into them, or use model plate."
         )
+
+
+def _gusts_too_short(scenario: Scenario) -> Iterator[str]:
+    step = scenario.coupling.step
+    for index, gust in enumerate(scenario.environment.gusts):
+        frequency = abs(gust.frequency)
+        if frequency * step * STEPS_A_GUST > 1.0:
+            yield (
+                f"{scenario.source}: environment.gusts[{index}].frequency: a gust of {frequency:g} Hz takes "
+                f"{1.0 / (frequency * step):.2g} steps of {step:g} s, and is not seen as it is. Use a "
+                f"coupling.step of {1.0 / (frequency * STEPS_A_GUST):.2g} s or less."
+            )
 
 
 def _too_light(scenario: Scenario, provider: Provider) -> Iterator[str]:

@@ -121,6 +121,12 @@ def export(
     typer.echo(
         f"wrote {done.file}: FMI {done.fmi}, {done.bytes / 1000:.0f} kB, for {', '.join(done.platforms)}"
     )
+    acting = [provider.name for provider in loaded.providers if provider.model != "none"]
+    if part is PartChoice.DYNAMICS and acting:
+        typer.echo(
+            f"The forces of {', '.join(acting)} are inputs of it: no wind is in there. "
+            "--ssp takes both, --part aero the model alone."
+        )
 
 
 def _export_system(scenario: Scenario, out: Path, platforms: list[str], *, as_json: bool) -> None:

@@ -6,7 +6,7 @@
 """
 
 from linkwind.scenario.bodies import Body, Joint
-from linkwind.scenario.loading import builtin_names, from_json, load, loads, template
+from linkwind.scenario.loading import builtin_names, builtin_text, from_json, load, loads, template
 from linkwind.scenario.model import Scenario
 from linkwind.scenario.providers import FieldExpressions, PlateModel, Provider
 from linkwind.scenario.settings import Bus, Coupling, Dynamics, Environment, Gust, Time
@@ -32,6 +32,7 @@ __all__ = [
     "Scenario",
     "Time",
     "builtin_names",
+    "builtin_text",
     "from_json",
     "load",
     "loads",

@@ -34,6 +34,22 @@ def builtin_names() -> list[str]:
     return sorted(entry.name.removesuffix(".toml") for entry in library if entry.name.endswith(".toml"))
 
 
+def builtin_text(name: str) -> str:
+    """Return a scenario that comes with linkwind as TOML.
+
+    Raises:
+        ScenarioError: there is none of this name.
+    """
+    if name not in builtin_names():
+        near = nearest(name, builtin_names())
+        advice = f'Use "{near}".' if near else "Choose one."
+        raise ScenarioError(
+            f"{name}: expected the name of a built-in scenario, {', '.join(builtin_names())}; got another. "
+            f"{advice}"
+        )
+    return _PACKAGE.joinpath("library", f"{name}.toml").read_text(encoding="utf-8")
+
+
 def load(source: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     """Return the scenario of a TOML file or of a built-in name.
 
@@ -45,8 +61,7 @@ def load(source: str | Path, overrides: Sequence[str] = ()) -> Scenario:
         ScenarioError: there is no such file or name, or something in it is wrong; one line a problem.
     """
     if isinstance(source, str) and source in builtin_names():
-        text = _PACKAGE.joinpath("library", f"{source}.toml").read_text(encoding="utf-8")
-        return loads(text, f"{source}.toml", overrides)
+        return loads(builtin_text(source), f"{source}.toml", overrides)
     path = Path(source)
     try:
         text = path.read_text(encoding="utf-8-sig")

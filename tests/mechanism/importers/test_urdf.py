@@ -254,6 +254,7 @@ def test_what_was_left_out_is_at_the_top_of_the_file(tmp_path):
         "mimic joints (1): they move freely",
         "joint limits (1): the start is not between them; see --at",
         "joint frictions (1): dry friction is not modelled",
+        "limits of effort and velocity (1): they are the controller's",
         "gazebo extensions (1): they are for another program",
         "collision shapes (1): bodies do not touch",
     ):

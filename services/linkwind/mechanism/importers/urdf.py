@@ -240,6 +240,9 @@ def _note_left_out(model: Model, root: Element) -> None:
 
 def _note_of_joint(model: Model, joint: Element) -> None:
     name, kind = joint.text("name"), joint.text("type")
+    for limit in joint.all("limit"):
+        if {"effort", "velocity"} & set(limit.attributes):
+            model.leave_out("limits of effort and velocity", "they are the controller's", [name])
     for dynamics in joint.all("dynamics"):
         if dynamics.number("friction", 0.0):
             model.leave_out("joint frictions", "dry friction is not modelled", [name])
