@@ -3,6 +3,7 @@
 
 #include <stddef.h>
 
+#include "lw_dense.h"
 #include "lw_linear.h"
 #include "lw_wake.h"
 
@@ -235,7 +236,7 @@ static int solve(lw_vortex *v, const lw_points *targets, const double *pose) {
             v->by_twist[(size_t)column * rings + i] =
                 column / 6 == i / z.rings ? lw_dot(normal, unit_velocity(column % 6, arm)) : 0.0;
     }
-    if (lw_factor(rings, v->matrix, v->pivots)) return 1;
+    if (lw_factor_dense(rings, v->matrix, v->pivots, v->instructions)) return 1;
     lw_substitute(rings, v->matrix, v->pivots, v->trial_strength);
     for (int32_t column = 0; column < z.columns; ++column)
         lw_substitute(rings, v->matrix, v->pivots, v->by_twist + (size_t)column * rings);
