@@ -64,6 +64,7 @@ def test_heavy_ones_go_on(caplog: pytest.LogCaptureFixture) -> None:
             ["coupling.step=1e-2"],
             "in a step, and as long are the rings of its wake; one is enough. Use about",
         ),
+        (["coupling.step=2e-3", "aero.vortex.spanwise=90"], "a step asks for 1620 equations to be solved"),
         (["coupling.step=1e-3", "aero.vortex.wake=30"], "30 rows reach 2.7 chords behind the wings"),
     ],
 )

@@ -15,6 +15,7 @@ WITHOUT_WIND = ("none", "field")  # models that read no wind from the scenario
 WANTED = ((2, 1.0), (math.inf, 2.0))
 COARSE = 2.0  # panels that a wing goes in a step: above, lift after a sudden change is some percent off
 STEPS_A_GUST = 8.0  # that tell its shape: with fewer, a sine's largest value is missed by 8 % and more
+MANY_RINGS = 1500  # a step takes 0.6 s, and grows with the third power
 SHORT = 4.0  # chords: what a shorter wake leaves out is felt
 
 
@@ -26,7 +27,7 @@ def doubts(scenario: Scenario) -> Iterator[str]:
         if provider.model == "flow":
             yield from _too_light(scenario, provider)
         if provider.model == "vortex":
-            yield from _wake_too_coarse_or_short(scenario, provider)
+            yield from _of_rings(scenario, provider)
 
 
 def _no_wind(scenario: Scenario) -> Iterator[str]:
@@ -69,8 +70,15 @@ def _too_light(scenario: Scenario, provider: Provider) -> Iterator[str]:
             )
 
 
-def _wake_too_coarse_or_short(scenario: Scenario, provider: Provider) -> Iterator[str]:
+def _of_rings(scenario: Scenario, provider: Provider) -> Iterator[str]:
     wind, settings = scenario.environment.wind, provider.vortex
+    rings = settings.chordwise * settings.spanwise * len(provider.bodies)
+    if rings > MANY_RINGS:
+        yield (
+            f"{item(scenario, provider, 'vortex', 'chordwise')}: a step asks for {rings} equations to be "
+            f"solved, which takes seconds, and coupling.timeout is {scenario.coupling.timeout:g} s. Raise "
+            "that, or use fewer rings."
+        )
     speeds = [math.dist(wind, body.velocity or (0.0, 0.0, 0.0)) for body in scenario.bodies]
     chord = min(
         getattr(scenario.bodies[index].shape, "length", math.inf)
