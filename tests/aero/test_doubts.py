@@ -86,3 +86,17 @@ def test_gusts_that_are_over_in_a_few_steps(frequency: float, told: bool) -> Non
     if frequency == -300.0:
         assert "takes 3.3 steps of 0.001 s" in found[0]
         assert "coupling.step of 0.00042 s or less" in found[0]
+
+
+@pytest.mark.parametrize(
+    ("setting", "told"),
+    [
+        ("joints.hinge.rest=45", 'joints[0] "hinge".rest: 45 rad is 2578°, more than a turn'),
+        ("joints.hinge.stop=[-90,90]", "If it is meant in degrees, write -1.571."),
+        ("joints.hinge.rest=0.785", None),
+    ],
+)
+def test_angles_that_look_like_degrees(setting: str, told: str | None) -> None:
+    found = list(doubts(load("two_link", [setting])))
+    assert bool(found) == (told is not None)
+    assert told is None or any(told in doubt for doubt in found)

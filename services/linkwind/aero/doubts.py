@@ -23,6 +23,7 @@ def doubts(scenario: Scenario) -> Iterator[str]:
     """Yield what to tell the user before a run, a sentence each; the scenario has been checked."""
     yield from _no_wind(scenario)
     yield from _gusts_too_short(scenario)
+    yield from _angles_in_degrees(scenario)
     for provider in scenario.providers:
         if provider.model == "flow":
             yield from _too_light(scenario, provider)
@@ -50,6 +51,19 @@ def _gusts_too_short(scenario: Scenario) -> Iterator[str]:
                 f"{1.0 / (frequency * step):.2g} steps of {step:g} s, and is not seen as it is. Use a "
                 f"coupling.step of {1.0 / (frequency * STEPS_A_GUST):.2g} s or less."
             )
+
+
+def _angles_in_degrees(scenario: Scenario) -> Iterator[str]:
+    for index, joint in enumerate(scenario.joints):
+        if joint.type != "revolute":
+            continue
+        angles = [("rest", joint.rest), *(("stop", limit) for limit in joint.stop or ())]
+        for key, angle in angles:
+            if isinstance(angle, float) and abs(angle) > 2.0 * math.pi:
+                yield (
+                    f"{scenario.where('joints', index)}.{key}: {angle:g} rad is {math.degrees(angle):.0f}°, "
+                    f"more than a turn. If it is meant in degrees, write {math.radians(angle):.4g}."
+                )
 
 
 def _too_light(scenario: Scenario, provider: Provider) -> Iterator[str]:
