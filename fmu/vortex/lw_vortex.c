@@ -261,18 +261,23 @@ static void add_wrench(double *wrench, lw_vec3 force, lw_vec3 arm) {
     lw_store3(wrench + 3, lw_add(lw_load3(wrench + 3), lw_cross(arm, force)));
 }
 
-/* Add the force of velocity and strength on every filament, rho gamma u x l, to wrench (n, 6). */
+/* Add the force of velocity and strength on every filament, rho gamma u x l, to wrench (n, 6). What those across
+ * the chord bear along it is the suction of the leading edge: elsewhere it is next to nothing. */
 static void steady_wrench(const lw_vortex *v, const double *pose, const double *strength,
                           double *const middle[3], double *const velocity[3], double *wrench) {
     const sizes z = sizes_of(v);
     for (int32_t b = 0; b < v->surfaces; ++b) {
         const double *placed = v->placed + 3 * b * z.corners;
+        const lw_mat3 turn = lw_quat_matrix(lw_load4(pose + 7 * b + 3));
+        const lw_vec3 chord = lw_vec(turn.xx, turn.yx, turn.zx);
         for (int32_t k = 0; k < z.bearers; ++k) {
             const bearer f = bearer_of(v, b, k);
             const int32_t target = v->surfaces * z.rings + b * z.bearers + k;
             const lw_vec3 along = lw_sub(lw_load3(placed + 3 * f.to), lw_load3(placed + 3 * f.from));
             const lw_vec3 arm = lw_sub(at(middle, target), lw_load3(pose + 7 * b));
-            const lw_vec3 force = lw_cross(at(velocity, target), along);
+            lw_vec3 force = lw_cross(at(velocity, target), along);
+            if (k < z.spanwise)
+                force = lw_sub(force, lw_scale((1.0 - v->suction) * lw_dot(force, chord), chord));
             add_wrench(wrench + 6 * b, lw_scale(v->density * net(strength, &f), force), arm);
         }
     }

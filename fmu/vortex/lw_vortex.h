@@ -22,6 +22,7 @@ typedef struct {
     int32_t capacity;                      /* rows of wake rings that are kept at most */
     int32_t instructions;                  /* lw_instructions; written by lw_vortex_init */
     double density, step, core;            /* [kg/m^3]; h [s]; radius of the wakes' cores [m] */
+    double suction;                        /* share of the pull along the chord, at leading edges, that is there */
     lw_wind wind;
     const double *corner;  /* (n, c + 1, s + 1, 3) in the frame of the body [m] */
     const double *control; /* (n, c, s, 3) collocation points, likewise */

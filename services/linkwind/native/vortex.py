@@ -29,6 +29,7 @@ class SurfaceTable:
         core: radius of the wakes' cores [m].
         rows: of the wakes that are kept.
         wind: that all surfaces are in.
+        suction: share of the pull along the chord, at the leading edges, that is there.
     """
 
     corner: Array
@@ -38,6 +39,7 @@ class SurfaceTable:
     core: float
     rows: int
     wind: WindTable
+    suction: float = 1.0
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -70,7 +72,7 @@ class _Vortex(ctypes.Structure):
 
     _fields_ = [
         *((name, ctypes.c_int32) for name in _NUMBERS),
-        *((name, ctypes.c_double) for name in ("density", "step", "core")),
+        *((name, ctypes.c_double) for name in ("density", "step", "core", "suction")),
         ("wind", WindStruct),
         *((name, ctypes.c_void_p) for name in ("corner", "control", "threads")),
         ("started", ctypes.c_int32),
@@ -103,6 +105,7 @@ class VortexLattice:
         self.wrench, self.response = np.zeros((n, 6)), np.zeros((6 * n, 6 * n))
         self._pose, self._twist = np.zeros((n, 7)), np.zeros((n, 6))
         self._struct = _Vortex(n, c, s, table.rows, 0, table.density, table.step, table.core)
+        self._struct.suction = table.suction
         self._self = ctypes.addressof(self._struct)
         declare("lw_vortex_init", [ctypes.c_void_p], None)(self._self)
         self._struct.wind = WindStruct.of(table.wind)

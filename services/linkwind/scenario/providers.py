@@ -143,6 +143,14 @@ class VortexModel(Section):
         gt=0.0,
         le=1.0,
     )
+    suction: float = quantity(
+        "Share of the suction of the leading edges that is there: 1 for round ones, 0 for sharp ones, where "
+        "the force stands across the plate",
+        "1",
+        1.0,
+        ge=0.0,
+        le=1.0,
+    )
     trailing_edge: dict[str, Literal["+x", "-x"]] = Field(
         default={},
         description="Which edge of a plate sheds its wake, by body, in its frame; default: the downstream "

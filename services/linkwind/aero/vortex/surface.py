@@ -69,6 +69,7 @@ def surfaces(scenario: Scenario, provider: Provider, sides: Array) -> SurfaceTab
         core=settings.core * min(plate.length for plate in size),
         rows=settings.wake,
         wind=wind_table(scenario.environment),
+        suction=settings.suction,
     )
 
 
