@@ -35,6 +35,13 @@ def wrench_step(n, added=0, kind=1):
     return message
 
 
+def another(message, **fields):
+    """Return the message with other fields; None takes one away."""
+    for name, value in fields.items():
+        message.ClearField(name) if value is None else setattr(message, name, value)
+    return message
+
+
 def same_bits(a, b):
     return struct.pack(f"<{len(a)}d", *a) == struct.pack(f"<{len(b)}d", *b)
 
@@ -115,7 +122,13 @@ def test_other_encodings_are_filled_through_the_parser():
     [
         (wrench_step(3), r"WrenchStep\.force: expected 6 values; got 9 values"),
         (wrench_step(2, added=72), r"WrenchStep\.added_inertia: expected 0 values; got 72 values"),
-        (wrench_step(2, kind=2), "strings and enums"),
+        (
+            wrench_step(2, kind=2),
+            r"WrenchStep\.kind: expected \"WRENCH_KIND_POINT\"; got \"WRENCH_KIND_MEAN\"",
+        ),
+        (wrench_step(2, kind=7), r"WrenchStep\.kind: expected \"WRENCH_KIND_POINT\"; got 7"),
+        (another(wrench_step(2), run="run-2"), r"WrenchStep\.run: expected \"run-1\"; got \"run-2\""),
+        (another(wrench_step(2), provider=None), r"WrenchStep\.provider: expected \"aero\"; got nothing"),
         (MESSAGES["WrenchStep"](), r"WrenchStep\.step: expected 1 values; got no field"),
     ],
 )

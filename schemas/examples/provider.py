@@ -1,12 +1,14 @@
 """A provider that uses nothing of linkwind: drag on every body, F = -c |v| v.
 
-    pip install eclipse-zenoh protobuf
+    pip install eclipse-zenoh==1.10.2 protobuf
     python provider.py tcp/127.0.0.1:7447          # to: linkwind dynamics two_link
 
 It follows schemas/README.md from top to bottom. It remembers nothing, so it can go back, go on from a
 checkpoint and come back after it was killed with almost no work. linkwind conformance finds nothing wrong.
+A copy of it elsewhere needs --schema FILE: the compiled schema, linkwind/v1/linkwind.binpb.
 """
 
+import argparse
 import hashlib
 import json
 import queue
@@ -22,11 +24,23 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 DRAG = 0.5  # N·s²/m²
 POINT = 1  # kind of the wrench: the value at t_{k+1}
 
-endpoint, name = sys.argv[1], (sys.argv[2:] or ["aero"])[0]
+beside = Path(__file__).parent.parent / "linkwind/v1/linkwind.binpb"
+parser = argparse.ArgumentParser(description="Drag on every body of a linkwind run.")
+parser.add_argument("endpoint", help="of the dynamics, such as tcp/127.0.0.1:7447")
+parser.add_argument("name", nargs="?", default="aero", help="of this provider, as in the scenario")
+parser.add_argument("--schema", type=Path, default=beside, help="the compiled schema, linkwind.binpb")
+given = parser.parse_args()
+name = given.name
 
 # ---- the schema ----
 
-descriptors = (Path(__file__).parent.parent / "linkwind/v1/linkwind.binpb").read_bytes()
+try:
+    descriptors = given.schema.read_bytes()
+except OSError as error:
+    parser.error(
+        f"{given.schema}: expected the compiled schema, schemas/linkwind/v1/linkwind.binpb of linkwind; "
+        f"got {error.strerror}. Say where it is: --schema FILE"
+    )
 pool = descriptor_pool.DescriptorPool()
 for file in descriptor_pb2.FileDescriptorSet.FromString(descriptors).file:
     pool.Add(file)
@@ -41,7 +55,7 @@ config = zenoh.Config()
 settings = {
     "mode": "peer",
     "region_name": "provider",
-    "connect/endpoints": [endpoint],
+    "connect/endpoints": [given.endpoint],
     "scouting/multicast/enabled": False,
     "transport/link/tx/lease": 1000,
 }
@@ -50,42 +64,57 @@ for key, value in settings.items():
 session = zenoh.open(config)
 
 
-def request(run, **body):
-    """Ask the dynamics until it answers."""
-    asked = Control(**body).SerializeToString()
-    while True:
-        for reply in session.get(f"linkwind/v1/{run}/control/{name}", payload=asked, timeout=5.0):
+def request(run, patience=float("inf"), **body):
+    """Ask the dynamics until it answers, or for so many seconds."""
+    asked, end = Control(**body).SerializeToString(), time.monotonic() + patience
+    while time.monotonic() < end:
+        replies = session.get(f"linkwind/v1/{run}/control/{name}", payload=asked, timeout=min(5.0, patience))
+        for reply in replies:
             if reply.ok is not None:
                 answer = Control.FromString(reply.ok.payload.to_bytes())
                 if answer.HasField("refuse"):
                     sys.exit(answer.refuse.reason)
                 return answer
         time.sleep(0.05)
+    return None
 
 
 # ---- hand-shake ----
 
 instance = uuid.uuid4().hex
-hello = {"name": name, "schema_sha256": hashlib.sha256(descriptors).hexdigest(), "instance": instance}
-welcome = request("*", hello=hello).welcome
-bodies = [list(welcome.bodies).index(body) for body in welcome.provider_bodies]
-base = f"linkwind/v1/{welcome.run}"
 inbox = queue.SimpleQueue()
-motions = session.declare_subscriber(f"{base}/motion", lambda sample: inbox.put(sample.payload.to_bytes()))
-fault = session.declare_subscriber(f"{base}/fault", lambda _: inbox.put(None))
-left = session.liveliness().declare_subscriber(
-    f"{base}/alive/dynamics",
-    lambda sample: inbox.put(None) if sample.kind == zenoh.SampleKind.DELETE else None,
-)
-block = {"congestion_control": zenoh.CongestionControl.BLOCK}
-wrenches = session.declare_publisher(f"{base}/wrench/{name}", **block)
-checkpoints = session.declare_publisher(f"{base}/observe/checkpoint/{name}", **block)
-token = session.liveliness().declare_token(f"{base}/alive/{name}")
 
-resumed = welcome.HasField("resume")
-start = welcome.resume.step if resumed else -1  # committed before the first motion
-saved = welcome.resume.number - 1 if resumed else 0
-at, answer = (start, 0), b""
+
+def join():
+    """Say Hello, learn what the run is, listen to it."""
+    global welcome, bodies, wrenches, checkpoints, held, saved, at, answer
+    hello = {
+        "name": name,
+        "schema_sha256": hashlib.sha256(descriptors).hexdigest(),
+        "version": "provider.py 1",  # program and version, for people and for the log
+        "instance": instance,
+    }
+    welcome = request("*", hello=hello).welcome
+    bodies = [list(welcome.bodies).index(body) for body in welcome.provider_bodies]
+    base = f"linkwind/v1/{welcome.run}"
+    motions = session.declare_subscriber(f"{base}/motion", lambda sample: inbox.put(sample.payload.to_bytes()))
+    fault = session.declare_subscriber(f"{base}/fault", lambda _: inbox.put(None))
+    left = session.liveliness().declare_subscriber(
+        f"{base}/alive/dynamics",
+        lambda sample: inbox.put(None) if sample.kind == zenoh.SampleKind.DELETE else None,
+    )
+    block = {"congestion_control": zenoh.CongestionControl.BLOCK}
+    wrenches = session.declare_publisher(f"{base}/wrench/{name}", **block)
+    checkpoints = session.declare_publisher(f"{base}/observe/checkpoint/{name}", **block)
+    token = session.liveliness().declare_token(f"{base}/alive/{name}")
+    held = motions, fault, left, token  # zenoh ends what nobody holds
+    resumed = welcome.HasField("resume")
+    start = welcome.resume.step if resumed else -1  # committed before the first motion
+    saved = welcome.resume.number - 1 if resumed else 0
+    at, answer = (start, 0), b""
+
+
+# ---- the force model ----
 
 
 def wrench(motion):
@@ -103,6 +132,13 @@ def wrench(motion):
         found.force.extend(-DRAG * hypot(*v) * component for component in v)
         found.torque.extend([0.0, 0.0, 0.0])
     return found.SerializeToString(deterministic=True)
+
+
+# ---- lock step ----
+
+
+class ProtocolError(Exception):
+    """The dynamics did something else than the protocol says."""
 
 
 def commit(step):
@@ -141,30 +177,34 @@ def respond(payload):
         if motion.step:
             commit(motion.step - 1)
     elif asked != (at[0], at[1] + 1):
-        text = f"expected step {at[0] + 1}; got {motion.step}: a motion was lost"
-        request(
-            welcome.run,
-            fault={"participant": name, "step": motion.step, "code": "ProtocolError", "text": text},
-        )
-        sys.exit(text)
+        raise ProtocolError(f"expected step {at[0] + 1}; got {motion.step}: a motion was lost")
     at, answer = asked, wrench(motion)
     return answer
 
 
-# ---- lock step ----
+def take_part():
+    """Catch up, say Ready, answer motion after motion until the run is over."""
+    again = [hashlib.sha256(respond(motion)).digest() for motion in welcome.catch_up.motions]
+    ready = {"name": name, "instance": instance, "kind": POINT, "rollback": True}
+    if welcome.HasField("catch_up"):
+        ready["answers_sha256"] = hashlib.sha256(b"".join(again)).digest()
+    request(welcome.run, ready=ready)
+    while (payload := inbox.get()) is not None:
+        if not payload:
+            continue
+        reply = respond(payload)
+        if reply is None:
+            request(welcome.run, bye={"name": name, "checkpoints": saved})
+            break
+        if reply:
+            wrenches.put(reply)
 
-again = [hashlib.sha256(respond(motion)).digest() for motion in welcome.catch_up.motions]
-ready = {"name": name, "instance": instance, "kind": POINT, "rollback": True}
-if welcome.HasField("catch_up"):
-    ready["answers_sha256"] = hashlib.sha256(b"".join(again)).digest()
-request(welcome.run, ready=ready)
-while (payload := inbox.get()) is not None:
-    if not payload:
-        continue
-    reply = respond(payload)
-    if reply is None:
-        request(welcome.run, bye={"name": name, "checkpoints": saved})
-        break
-    if reply:
-        wrenches.put(reply)
-session.close()
+
+with session:  # closed however this ends: an open one keeps the process, and its liveliness token, alive
+    join()
+    try:
+        take_part()
+    except Exception as error:  # whatever it was, the dynamics is told why nobody will answer
+        told = {"participant": name, "step": at[0] + 1, "code": type(error).__name__, "text": str(error)}
+        request(welcome.run, patience=1.0, fault=told)
+        raise

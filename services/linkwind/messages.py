@@ -69,11 +69,14 @@ class _Message:
             self._read_stamp()
             return
         try:
-            message = MESSAGES[self._name].FromString(payload)
-            self.layout.fill(message)
-            self._read_stamp()
-        except (DecodeError, ValueError) as error:
+            self.layout.fill(MESSAGES[self._name].FromString(payload))
+        except DecodeError as error:
             raise ProtocolError(f"{what}: expected a {self._name} of this run; got {error}") from error
+        except ValueError as error:
+            raise ProtocolError(
+                f"{what}: {error}. Every message is of the run of Welcome, and of the form that Ready says."
+            ) from error
+        self._read_stamp()
 
     def fits(self, other: _Message) -> bool:
         """Tell whether another message has the same layout."""

@@ -13,6 +13,7 @@ The wire format: https://protobuf.dev/programming-guides/encoding/.
 
 from __future__ import annotations
 
+import reprlib
 import struct
 import sys
 from collections.abc import Iterator
@@ -189,13 +190,36 @@ class FixedLayout:
 
     def _difference(self, message: Any) -> str:
         other = FixedLayout(message)
-        name = message.DESCRIPTOR.full_name
+        name = message.DESCRIPTOR.name
         for field in self.views | other.views:
             expected, got = self.views.get(field), other.views.get(field)
             if expected is None or got is None or len(expected) != len(got):
                 sizes = ["no field" if view is None else f"{len(view)} values" for view in (expected, got)]
                 return f"{name}.{field}: expected {sizes[0]}; got {sizes[1]}"
-        return f"{name}: expected the strings and enums of the template {self._expected}; got another"
+        ours, theirs = dict(_words(type(message).FromString(self.template))), dict(_words(message))
+        field = next((field for field in ours if ours[field] != theirs[field]), None)
+        if field is None:
+            return f"{name}: expected other bytes between its values"
+        return f"{name}.{field}: expected {_word(ours[field])}; got {_word(theirs[field])}"
+
+
+def _words(message: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield dotted name and value of every field that has no fixed width; an enum's name, None for no field."""
+    for field in message.DESCRIPTOR.fields:
+        name, value = prefix + field.name, getattr(message, field.name)
+        if field.type == FieldDescriptor.TYPE_MESSAGE:
+            yield from _words(value, f"{name}.")
+        elif field.type not in DTYPES:
+            if field.has_presence and not message.HasField(field.name):
+                value = None
+            elif field.type == FieldDescriptor.TYPE_ENUM and value in field.enum_type.values_by_number:
+                value = field.enum_type.values_by_number[value].name
+            yield name, value
+
+
+def _word(value: Any) -> str:
+    """Return a value for an error, not longer than a line."""
+    return "nothing" if value is None else reprlib.repr(value).replace("'", '"')
 
 
 def _constants(regions: dict[str, Region], size: int) -> struct.Struct:

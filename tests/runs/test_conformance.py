@@ -14,6 +14,7 @@ from linkwind.runs.conformance import CHECKS, conformance
 from linkwind.scenario import load
 
 EXAMPLE = Path(__file__).parents[2] / "schemas" / "examples" / "provider.py"
+SCHEMA = EXAMPLE.parents[1] / "linkwind" / "v1" / "linkwind.binpb"
 OWN = [sys.executable, "-m", "linkwind", "aero", "--connect", "{endpoint}", "--name", "{name}"]
 
 # What is changed in the example, and the checks that must find it, alone.
@@ -61,10 +62,8 @@ def test_what_is_wrong_is_found(name: str, tmp_path: Path) -> None:
     old, new, expected = MUTANTS[name]
     text = EXAMPLE.read_text()
     assert old in text
-    here = f"Path({str(EXAMPLE.parents[1])!r})"
-    changed = text.replace(old, new).replace("Path(__file__).parent.parent", here)
-    (tmp_path / "wrong.py").write_text("COUNT = []\n" + changed)
-    command = [sys.executable, str(tmp_path / "wrong.py"), "{endpoint}"]
+    (tmp_path / "wrong.py").write_text("COUNT = []\n" + text.replace(old, new))
+    command = [sys.executable, str(tmp_path / "wrong.py"), "{endpoint}", "--schema", str(SCHEMA)]
     scenario = load("two_link", ["coupling.timeout=3.0", "bus.start_timeout=5.0"])
     results = {result.check: result for result in conformance(scenario, "aero", command, tmp_path / "out")}
     wrong = [check for check, result in results.items() if result.ok is False]

@@ -1,0 +1,82 @@
+"""A provider that is not linkwind's: what it comes to when it fails, and what a log says of its answers."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from linkwind.bus.zenoh import loopback_endpoint
+from linkwind.errors import FaultError
+from linkwind.runs.run import Ends, Outcome, dynamics
+from linkwind.scenario import Scenario, load
+
+EXAMPLE = Path(__file__).parents[2] / "schemas" / "examples" / "provider.py"
+SCHEMA = EXAMPLE.parents[1] / "linkwind" / "v1" / "linkwind.binpb"
+PATIENCE = 30.0  # s for a machine under load
+
+
+def start(program: Path, endpoint: str) -> subprocess.Popen[str]:
+    command = [sys.executable, str(program), endpoint, "--schema", str(SCHEMA)]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+
+
+def answered(scenario: Scenario, out: Path, program: Path = EXAMPLE) -> Outcome:
+    """Return a run whose forces come from a program of its own."""
+    endpoint = loopback_endpoint()
+    process = start(program, endpoint)
+    try:
+        return dynamics(scenario, out, lambda step: None, Ends([endpoint], []))
+    finally:
+        _, printed = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 0, printed
+
+
+def test_an_error_in_the_forces_is_told_and_ends_the_process(tmp_path: Path) -> None:
+    """And the dynamics hears which error it was, and where, rather than waiting for coupling.timeout."""
+    text = EXAMPLE.read_text()
+    old = "    for body in bodies:\n"
+    assert text.count(old) == 1
+    program = tmp_path / "fails.py"
+    program.write_text(text.replace(old, "    1 / (motion.step - 3)\n" + old))
+    endpoint, ended = loopback_endpoint(), []
+    process = start(program, endpoint)
+
+    def await_end() -> None:
+        process.wait()
+        ended.append(time.monotonic())
+
+    waiting = threading.Thread(target=await_end)
+    waiting.start()
+    try:
+        told = '"aero" stopped at step 3: ZeroDivisionError: division by zero'
+        with pytest.raises(FaultError, match=told):
+            dynamics(load("two_link", ["time.end=0.01"]), tmp_path / "out", lambda step: None, Ends([endpoint], []))
+        over = time.monotonic()
+        waiting.join(PATIENCE)
+    finally:
+        process.kill()
+        waiting.join()
+    assert ended[0] - over < 2.0
+    assert process.returncode == 1
+    assert process.stderr is not None
+    printed = process.stderr.read()
+    assert printed.startswith("Traceback")
+    assert printed.endswith("ZeroDivisionError: division by zero\n")
+
+
+def test_a_copy_without_the_schema_says_what_is_missing(tmp_path: Path) -> None:
+    copy = tmp_path / "a" / "b" / "mine.py"
+    copy.parent.mkdir(parents=True)
+    copy.write_text(EXAMPLE.read_text())
+    command = [sys.executable, str(copy), "tcp/127.0.0.1:9"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    missing = tmp_path / "a" / "linkwind" / "v1" / "linkwind.binpb"
+    assert f"error: {missing}: expected the compiled schema" in done.stderr
+    assert "got No such file or directory. Say where it is: --schema FILE" in done.stderr
