@@ -25,6 +25,7 @@ WAITING = {
     "dynamics": "waiting for aero: linkwind aero --connect",
     "resume": "waiting for aero: linkwind aero --connect",
     "replay": "waiting at",
+    "record": "waiting for a run at",
     "replay --substitute aero": "waiting for aero: linkwind aero --connect",
     "replay --substitute dynamics": "aero: waiting for a dynamics at",
 }
@@ -34,9 +35,11 @@ def arguments(command: str, log: str) -> list[str]:
     name, *options = command.split()
     settings = {
         "dynamics": ["--set", "bus.start_timeout=0.2"],
+        "record": ["--start-timeout", "0.2"],
         "resume": ["--set", "bus.transport=zenoh", "--from-step", "3"],
     }
-    return [name, "two_link" if name == "dynamics" else log, *options, *settings.get(name, [])]
+    source = {"dynamics": ["two_link"], "record": []}.get(name, [log])
+    return [name, *source, *options, *settings.get(name, [])]
 
 
 @pytest.mark.parametrize("command", WAITING)

@@ -79,10 +79,29 @@ def test_an_unknown_provider_is_refused(tmp_path: Path) -> None:
 
 def test_a_program_that_is_not_there_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no-such-program: cannot be started: No such file"):
-        conformance(load("two_link"), "aero", ["no-such-program"], tmp_path / "out")
+        conformance(load("two_link"), "aero", ["no-such-program", "{endpoint}"], tmp_path / "out")
 
 
 def test_a_program_that_ends_is_told(tmp_path: Path) -> None:
-    results = conformance(load("two_link"), "aero", [sys.executable, "-c", "exit(7)"], tmp_path / "out")
+    command = [sys.executable, "-c", "exit(7)", "{endpoint}"]
+    results = conformance(load("two_link"), "aero", command, tmp_path / "out")
     assert results[0].saw == "its process ended with status 7"
     assert [result.ok for result in results] == [False, *[None] * (len(CHECKS) - 1)]
+
+
+def test_the_last_line_that_it_printed_is_told(tmp_path: Path) -> None:
+    """Of this process: what is in the file before is of others."""
+    command = [sys.executable, "-c", "print('begun'); raise ValueError('no table\\n')", "{endpoint}"]
+    (tmp_path / "out").write_text("of the life before\n")
+    results = conformance(load("two_link"), "aero", command, tmp_path / "out")
+    told = "its process ended with status 1; the last that it printed: ValueError: no table"
+    assert results[0].saw == told
+
+
+def test_a_command_without_the_endpoint_is_refused_at_once(tmp_path: Path) -> None:
+    linkwind = [sys.executable, "-m", "linkwind", "conformance", "two_link", "--", "python", "my own.py"]
+    done = subprocess.run(linkwind, capture_output=True, text=True, cwd=tmp_path, timeout=60, check=False)
+    assert done.returncode == 3
+    assert "expected {endpoint} in it" in done.stderr
+    assert "linkwind conformance SCENARIO -- python 'my own.py' {endpoint}" in done.stderr
+    assert "not reached" not in done.stdout

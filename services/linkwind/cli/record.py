@@ -46,6 +46,10 @@ def record(
     if not connect and not listen:
         connect = [default_endpoint(tls)]
 
+    def opened() -> None:
+        where = ", ".join([*(listen or []), *(connect or [])])
+        typer.echo(f"waiting for a run at {where}, at most {start_timeout:g} s", err=as_json)
+
     def found(name: str, scenario: Scenario) -> None:
         if not as_json:
             typer.echo(f"listening to run {name} of {scenario.name}")
@@ -57,6 +61,7 @@ def record(
         out=out,
         timeout=start_timeout,
         identity=identity_in(tls, OBSERVER),
+        opened=opened,
         found=found,
     )
     report = _report(done)

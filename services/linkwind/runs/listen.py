@@ -55,6 +55,7 @@ def listen_to(
     out: Path | None,
     timeout: float,
     identity: Identity | None = None,
+    opened: Callable[[], None] = lambda: None,
     found: Callable[[str, Scenario], None] = lambda run, scenario: None,
     progress: Callable[[int], None] = lambda step: None,
 ) -> Recording:
@@ -67,6 +68,7 @@ def listen_to(
         out: folder for the log; None for a new one under ``runs/``.
         timeout: [s] to wait for the run.
         identity: what this end shows; None without TLS.
+        opened: is called when the endpoints are open.
         found: is told the id of the run and its scenario.
         progress: is told now and then how many steps are done.
 
@@ -79,6 +81,7 @@ def listen_to(
     from linkwind.bus.zenoh import ZenohListener
 
     with stops_as_interrupt(), closing(ZenohListener(listen, connect, run, identity)) as listener:
+        opened()
         about = described(listener.find(timeout))
         _check_version(about)
         scenario = from_json(about.scenario_json)

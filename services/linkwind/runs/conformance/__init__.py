@@ -6,6 +6,7 @@ message, iterates, loses one, goes on from a checkpoint, or meets a provider tha
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -119,11 +120,17 @@ def conformance(
         One result for each of ``CHECKS``.
 
     Raises:
-        InputError: there is no such provider, or its program cannot be started.
+        InputError: there is no such provider, its program cannot be started, or is not told the endpoint.
     """
     names = [provider.name for provider in scenario.providers]
     if name not in names:
         raise InputError(f"{scenario.source}: expected one of its providers, {', '.join(names)}; got {name}")
+    if not any("{endpoint}" in word for word in command):
+        line = shlex.join(command)
+        raise InputError(
+            f"the provider's command: expected {{endpoint}} in it, for where the dynamics listens; got: {line}. "
+            f"Add it where the program takes its endpoint: linkwind conformance SCENARIO -- {line} {{endpoint}}"
+        )
     provider, findings = Provider.of(scenario, name, command, output, STEPS), Findings(progress)
     for number, life in enumerate((_whole, _resumed, _killed, _gap, _ended)):
         try:

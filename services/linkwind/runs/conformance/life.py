@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple
@@ -23,6 +23,7 @@ from linkwind.scenario import Scenario
 from linkwind.spatial import Motion
 
 GOODBYE = 5.0  # s that it may take to say Bye; and to be missed when it was killed
+LONGEST = 300  # characters of what it has printed, in a result
 
 
 class Answer(NamedTuple):
@@ -43,6 +44,7 @@ class Provider:
         mechanism: of the scenario.
         motions: of a flight without forces, by step.
         output: what it prints.
+        begins: where in that each process begins [bytes].
     """
 
     name: str
@@ -51,6 +53,7 @@ class Provider:
     mechanism: Mechanism
     motions: Sequence[Motion]
     output: Path
+    begins: list[int] = field(default_factory=list)
 
     @classmethod
     def of(cls, scenario: Scenario, name: str, command: Sequence[str], output: Path, steps: int) -> Provider:
@@ -62,7 +65,14 @@ class Provider:
         """Start it."""
         words = [word.replace("{endpoint}", endpoint).replace("{name}", self.name) for word in self.command]
         with self.output.open("ab") as output:
+            self.begins.append(output.tell())
             return subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT)
+
+    def last_words(self) -> str:
+        """Return the last line that the last process has printed, as the end of a sentence; empty for none."""
+        printed = self.output.read_bytes()[self.begins[-1] :].decode(errors="replace")
+        lines = [line.strip() for line in printed.splitlines() if line.strip()]
+        return f"; the last that it printed: {lines[-1][:LONGEST]}" if lines else ""
 
 
 def _flight(scenario: Scenario, mechanism: Mechanism, steps: int) -> list[Motion]:
@@ -124,12 +134,13 @@ class Life:
             LostError: it does not come.
         """
         if not self.link.wait(lambda: not self.session.not_ready, self._start_timeout, self._poll):
-            raise LostError(f"no Ready within {self._start_timeout:g} s (bus.start_timeout)")
+            words = self._provider.last_words()
+            raise LostError(f"no Ready within {self._start_timeout:g} s (bus.start_timeout){words}")
 
     def _poll(self) -> None:
         status = self._process.poll()
         if status is not None and self.session.not_ready:
-            raise LostError(f"its process ended with status {status}")
+            raise LostError(f"its process ended with status {status}{self._provider.last_words()}")
 
     @property
     def rollback(self) -> bool:
