@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import threading
 import time
 from collections.abc import Iterator
@@ -197,6 +198,43 @@ def test_without_a_folder_the_newest_run_goes_on(
         fourth = started(scenario, None)
     assert isinstance(fourth, Outcome)
     assert len(list(runs.glob("two_link_field-2*"))) == 3
+
+
+def test_newer_runs_of_other_settings_are_passed_over(
+    scenario: Scenario, whole: Outcome, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    mine, others, blank = (Path("runs") / f"two_link_field-20260101-00000{n}" for n in (1, 2, 3))
+    left(whole, mine, 150)
+    longer = load("two_link_field", [*SETTINGS, "time.end=0.07", "bus.transport=inprocess"])
+    run(longer, others, lambda step: None)
+    blank.mkdir()
+    (blank / "log.mcap").write_bytes(whole.log.read_bytes()[:20])
+    for age, folder in enumerate((blank, others, mine)):
+        os.utime(folder / "log.mcap", (2e9 - age, 2e9 - age))
+    told: list[str] = []
+    done = started(scenario, None, tell=told.append)
+    assert isinstance(done, Resumed)
+    assert done.outcome.log == mine / "log.mcap"
+    assert told == [f"goes on with {mine}, the newest run of these settings"]
+    # Now it is over: nothing older of the same settings is taken up, and no blank log either.
+    os.utime(mine / "log.mcap", (2e9, 2e9))
+    again = started(scenario, None, tell=told.append)
+    assert isinstance(again, Outcome)
+    assert told[1:] == [f"begins a new run: the newest of these settings, {mine}, has come to its end"]
+
+
+def test_why_a_new_run_begins_is_told(
+    scenario: Scenario, whole: Outcome, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    told: list[str] = []
+    heavier = load("two_link_field", [*SETTINGS, "bodies.link1.mass=3"])
+    assert isinstance(started(heavier, None, tell=told.append), Outcome)
+    (folder,) = Path("runs").iterdir()
+    assert isinstance(started(scenario, None, tell=told.append), Outcome)
+    assert told[0] == "begins a new run: none of these settings is under runs/"
+    assert told[1] == f"{told[0]}; {folder} has another bodies.0.mass"
 
 
 def test_a_provider_of_the_dead_dynamics_that_goes_now_is_no_loss(

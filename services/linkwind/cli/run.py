@@ -86,7 +86,7 @@ def dynamics(
         bool,
         typer.Option(
             "--resume",
-            help="Go on with the run in --out, or the newest under runs/, if it was cut; else begin.",
+            help="Go on with the run in --out, or the newest of these settings under runs/, if it was cut.",
         ),
     ] = False,
     as_json: JsonOption = False,
@@ -108,7 +108,8 @@ def dynamics(
         how: dict[str, Any] = {"run_id": run_id, "watch": watch, "listened": await_listener}
         if resume:
             tell = (lambda found: None) if as_json else tell_plan
-            return restart(loaded, out, progress, ends, goes_on=tell, **how)
+            say = (lambda text: None) if as_json else typer.echo
+            return restart(loaded, out, progress, ends, goes_on=tell, tell=say, **how)
         return run_dynamics(loaded, out, progress, ends, **how)
 
     with watched(view, host, port, no_open) as watch:

@@ -70,26 +70,28 @@ def restart(
     watch: Watch | None = None,
     listened: bool = False,
     goes_on: Callable[[Plan], None] = lambda found: None,
+    tell: Callable[[str], None] = lambda text: None,
 ) -> Outcome | Resumed | Finished:
     """Go on with a run of ``scenario`` where its log ends, or begin it; else as ``dynamics`` of ``runs.run``.
 
     Args:
         scenario: what to run.
-        out: folder of the run; None for the newest run under ``runs/`` if it is one of the same scenario and
-            program and has not come to its end, else a new one.
+        out: folder of the run; None for the newest run of the same settings and program under ``runs/`` if
+            it has not come to its end, else a new one.
         progress: is told now and then how many steps are done, those from the log included.
         ends: where dynamics and providers meet.
         run_id: id of the run; empty for the folder's name.
         watch: who looks at the run while it goes on, if anybody.
         listened: do not begin, or go on, before somebody listens to all of the log.
         goes_on: is told of a run that goes on.
+        tell: is told, where ``out`` is None, which run goes on, or why a new one begins.
 
     Raises:
         LogError: the folder has the log of another run, or of one that is still being made.
         MismatchError: what was recorded does not come out again here; the log is as it was.
         LinkwindError: the run ended early; its log and report tell as well.
     """
-    folder = out if out is not None else _unfinished(scenario)
+    folder = out if out is not None else _unfinished(scenario, tell)
     if folder is None or not (folder / LOG).exists():
         return dynamics(scenario, folder, progress, ends, run_id=run_id, watch=watch, listened=listened)
     with ExitStack() as stack:
@@ -108,25 +110,58 @@ def restart(
         return resume_here(found, progress, ends, watch, listened=listened, release=stack.close)
 
 
-def _unfinished(scenario: Scenario) -> Path | None:
-    """Return the folder of the newest run of a scenario under ``runs/`` if it is to be gone on with."""
+def _unfinished(scenario: Scenario, tell: Callable[[str], None]) -> Path | None:
+    """Return the folder under ``runs/`` to go on in: of the newest run of these settings, if that was cut.
+
+    Runs that are none, or of others, are passed over. A log that says nothing of its run is taken where no
+    other one is.
+    """
+    blank, passed = None, ""
+    for log in _logs(scenario):
+        try:
+            found = _standing(log, scenario)
+        except LinkwindError as error:  # it is another's, or not to be read
+            passed = passed or f"; {error}"
+            continue
+        if found is None:
+            blank = blank or log.parent
+        elif found.complete and (log.parent / REPORT).exists():
+            tell(f"begins a new run: the newest of these settings, {log.parent}, has come to its end")
+            return None
+        else:
+            tell(f"goes on with {log.parent}, the newest run of these settings")
+            return log.parent
+    if blank is None:
+        tell(f"begins a new run: none of these settings is under runs/{passed}")
+    else:
+        tell(f"begins again in {blank}, where a run was cut before its log said anything{passed}")
+    return blank
+
+
+def _logs(scenario: Scenario) -> list[Path]:
+    """Return the logs under ``runs/`` in folders that are named as those of a scenario's runs, newest first."""
     name = re.compile(re.escape(scenario.name) + r"-\d{8}-\d{6}(-\d+)?")
     logs = [log for log in Path("runs").glob(f"*/{LOG}") if name.fullmatch(log.parent.name)]
-    newest = max(logs, key=lambda log: log.stat().st_mtime, default=None)
-    if newest is None:
+    return sorted(logs, key=lambda log: log.stat().st_mtime_ns, reverse=True)
+
+
+def _standing(path: Path, scenario: Scenario) -> Log | None:
+    """Return the log of a run of the same scenario by the same program; None for one that says nothing.
+
+    Raises:
+        LinkwindError: it is another's, is being written, or cannot be read.
+    """
+    with alone(path):
+        log = _opened(path)
+    if log is None:
         return None
-    try:
-        with alone(newest):
-            log = _opened(newest)
-        if log is not None:
-            _check_same(log, scenario, "")
-    except LinkwindError:  # it is another's, or not to be read
-        return None
-    made_by = None if log is None else (log.metadata.get("library_sha256"), log.metadata.get("schema_sha256"))
-    if made_by not in (None, (library_sha256(), schema.SHA256)):
-        return None
-    is_over = log is not None and log.complete and (newest.parent / REPORT).exists()
-    return None if is_over else newest.parent
+    others = _others(log, scenario, "")
+    made_by = log.metadata.get("library_sha256"), log.metadata.get("schema_sha256")
+    if made_by != (library_sha256(), schema.SHA256):
+        others.append("version of linkwind")
+    if others:
+        raise LogError(f"{path.parent} has another {', '.join(others[:5])}")
+    return log
 
 
 def _opened(path: Path) -> Log | None:
@@ -139,6 +174,16 @@ def _opened(path: Path) -> Log | None:
 
 def _check_same(log: Log, scenario: Scenario, run_id: str) -> None:
     """Raise LogError unless a log is of a run of this scenario, however that is done."""
+    others = _others(log, scenario, run_id)
+    if others:
+        raise LogError(
+            f"{log.path}: expected the log of the very same run, to go on with it; got another "
+            f"{', '.join(others[:5])}. Choose another --out, or give the settings of that run."
+        )
+
+
+def _others(log: Log, scenario: Scenario, run_id: str) -> list[str]:
+    """Return what of a log is not of a run of this scenario, however that is done."""
     try:
         others = [key for key in differences(recorded(log), scenario) if not _is_how(key)]
     except ScenarioError:
@@ -147,11 +192,7 @@ def _check_same(log: Log, scenario: Scenario, run_id: str) -> None:
         others.append("settings that changed on the way")
     if run_id and run_id != log.run:
         others.append(f'the run id "{log.run}"')
-    if others:
-        raise LogError(
-            f"{log.path}: expected the log of the very same run, to go on with it; got another "
-            f"{', '.join(others[:5])}. Choose another --out, or give the settings of that run."
-        )
+    return others
 
 
 def _is_how(key: str) -> bool:
