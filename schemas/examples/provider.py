@@ -97,7 +97,9 @@ def join():
     welcome = request("*", hello=hello).welcome
     bodies = [list(welcome.bodies).index(body) for body in welcome.provider_bodies]
     base = f"linkwind/v1/{welcome.run}"
-    motions = session.declare_subscriber(f"{base}/motion", lambda sample: inbox.put(sample.payload.to_bytes()))
+    motions = session.declare_subscriber(
+        f"{base}/motion", lambda sample: inbox.put(sample.payload.to_bytes())
+    )
     fault = session.declare_subscriber(f"{base}/fault", lambda _: inbox.put(None))
     left = session.liveliness().declare_subscriber(
         f"{base}/alive/dynamics",

@@ -197,14 +197,14 @@ class FixedLayout:
                 sizes = ["no field" if view is None else f"{len(view)} values" for view in (expected, got)]
                 return f"{name}.{field}: expected {sizes[0]}; got {sizes[1]}"
         ours, theirs = dict(_words(type(message).FromString(self.template))), dict(_words(message))
-        field = next((field for field in ours if ours[field] != theirs[field]), None)
-        if field is None:
-            return f"{name}: expected other bytes between its values"
-        return f"{name}.{field}: expected {_word(ours[field])}; got {_word(theirs[field])}"
+        for word, expected in ours.items():
+            if theirs[word] != expected:
+                return f"{name}.{word}: expected {_word(expected)}; got {_word(theirs[word])}"
+        return f"{name}: expected other bytes between its values"
 
 
 def _words(message: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield dotted name and value of every field that has no fixed width; an enum's name, None for no field."""
+    """Yield dotted name and value of every field of other than fixed width; an enum's name, None for none."""
     for field in message.DESCRIPTOR.fields:
         name, value = prefix + field.name, getattr(message, field.name)
         if field.type == FieldDescriptor.TYPE_MESSAGE:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import subprocess
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -22,7 +23,13 @@ def words(settings: str, folder: Path) -> list[str]:
         program.chmod(0o755)
     environment = {"PATH": f"{folder / 'bin'}:{os.environ['PATH']}", "LINKWIND_SET": settings}
     done = subprocess.run(
-        ["sh", str(START)], env=environment, cwd=folder, capture_output=True, text=True, timeout=60, check=False
+        ["sh", str(START)],
+        env=environment,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()
@@ -44,5 +51,5 @@ def test_settings_end_at_a_semicolon_or_a_line(settings: str, expected: list[str
     given = words(settings, tmp_path)
     assert given[:3] == ["dynamics", "two_link", "--resume"]
     assert given[-1] != "--set"
-    settings_given = [word for before, word in zip(given, given[1:], strict=False) if before == "--set"]
+    settings_given = [word for before, word in pairwise(given) if before == "--set"]
     assert [word for word in settings_given if not word.startswith("bus.recovery=")] == expected

@@ -57,7 +57,7 @@ def vectors() -> dict[str, tuple[str, dict[str, Any]]]:
         "playback_seek": ("Playback", {"paused": True, "timeNs": "120000000"}),
         "hello": (
             "Control",
-            {"hello": {"name": "aero", "schemaSha256": "00", "version": "0.1.0", "instance": "i"}},
+            {"hello": {"name": "aero", "schemaSha256": "00", "version": "linkwind 0.1.0", "instance": "i"}},
         ),
     }
 

@@ -195,10 +195,10 @@ def test_unknown_name_is_refused() -> None:
 
 def test_other_schema_ends_the_run_on_both_sides() -> None:
     d = dynamics()
-    hello = {"name": "aero", "schema_sha256": "0" * 64, "version": "0.0.1", "instance": "x"}
+    hello = {"name": "aero", "schema_sha256": "0" * 64, "version": "mine 0.0.1", "instance": "x"}
     reply = d.control(Control(hello=hello).SerializeToString())
     assert f"expected schema {SHA256[:12]}" in reason(reply)
-    assert "got 000000000000 (linkwind 0.0.1)" in reason(reply)
+    assert "got 000000000000 (mine 0.0.1)" in reason(reply)
     assert isinstance(d.failure, RefusedError)
 
 

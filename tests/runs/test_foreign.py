@@ -10,10 +10,17 @@ from pathlib import Path
 
 import pytest
 
+from linkwind import __version__
 from linkwind.bus.zenoh import loopback_endpoint
-from linkwind.errors import FaultError
-from linkwind.runs.run import Ends, Outcome, dynamics
+from linkwind.errors import FaultError, InputError
+from linkwind.log.contents import PROGRAMS
+from linkwind.log.origin import origin
+from linkwind.log.reader import open_log
+from linkwind.runs.resume import plan, resume
+from linkwind.runs.run import Ends, Outcome, dynamics, run
+from linkwind.runs.verify import scenario_of, verify
 from linkwind.scenario import Scenario, load
+from tests.runs.edit import rewrite
 
 EXAMPLE = Path(__file__).parents[2] / "schemas" / "examples" / "provider.py"
 SCHEMA = EXAMPLE.parents[1] / "linkwind" / "v1" / "linkwind.binpb"
@@ -55,7 +62,9 @@ def test_an_error_in_the_forces_is_told_and_ends_the_process(tmp_path: Path) -> 
     try:
         told = '"aero" stopped at step 3: ZeroDivisionError: division by zero'
         with pytest.raises(FaultError, match=told):
-            dynamics(load("two_link", ["time.end=0.01"]), tmp_path / "out", lambda step: None, Ends([endpoint], []))
+            dynamics(
+                load("two_link", ["time.end=0.01"]), tmp_path / "out", lambda step: None, Ends([endpoint], [])
+            )
         over = time.monotonic()
         waiting.join(PATIENCE)
     finally:
@@ -67,6 +76,48 @@ def test_an_error_in_the_forces_is_told_and_ends_the_process(tmp_path: Path) -> 
     printed = process.stderr.read()
     assert printed.startswith("Traceback")
     assert printed.endswith("ZeroDivisionError: division by zero\n")
+
+
+@pytest.fixture(scope="module")
+def foreign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of plates, as its scenario says, that the example has answered."""
+    return answered(load("two_link", ["time.end=0.05"]), tmp_path_factory.mktemp("run") / "out").log
+
+
+def test_verify_says_that_the_forces_are_anothers(foreign: Path) -> None:
+    log, scenario = scenario_of(foreign)
+    found = verify(log, scenario)
+    assert found.identical
+    assert found.steps == 50
+    assert 'the forces of "aero" (provider.py 1) were taken as recorded' in found.remark
+    assert list(origin(log)) == [
+        'the forces of "aero" come from a program that is not linkwind\'s: provider.py 1'
+    ]
+
+
+def test_of_linkwinds_own_nothing_is_said(tmp_path: Path) -> None:
+    settings = ["time.end=0.01", "bus.transport=inprocess"]
+    log, scenario = scenario_of(run(load("two_link", settings), tmp_path / "out").log)
+    assert log.record(PROGRAMS) == {"aero": f"linkwind {__version__}"}
+    assert not log.foreign
+    assert verify(log, scenario).remark == ""
+
+
+def test_a_dynamics_that_gives_other_states_is_still_found(foreign: Path, tmp_path: Path) -> None:
+    def disturbed(topic: str, number: int, payload: bytes) -> bytes | None:
+        return payload[:-1] + bytes([payload[-1] ^ 1]) if (topic, number) == ("/state", 30) else payload
+
+    log, scenario = scenario_of(rewrite(foreign, tmp_path / "log.mcap", disturbed))
+    found = verify(log, scenario)
+    assert found.difference is not None
+    assert found.difference.topic == "/state"
+
+
+def test_it_is_not_resumed_with_a_model_of_linkwinds(foreign: Path, tmp_path: Path) -> None:
+    found = plan(open_log(foreign), 20, ["environment.gravity=[0, -1.62, 0]"])
+    with pytest.raises(InputError, match=r'"aero": expected a model of linkwind; got provider.py 1\. Let it'):
+        resume(found, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_copy_without_the_schema_says_what_is_missing(tmp_path: Path) -> None:

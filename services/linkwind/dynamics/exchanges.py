@@ -80,6 +80,7 @@ class Exchanges:
                 f"linkwind aero --connect ENDPOINT --name {session.not_ready[0]}"
             )
         self._log.diagnostics({p.name: p.diagnostics for p in session.participants.values()})
+        self._log.programs({p.name: p.program for p in session.participants.values()})
 
     def ask(self, payload: bytes, meanwhile: Callable[[], None]) -> int:
         """Send a motion that the session has, take every answer; return how long that took [ns].

@@ -15,6 +15,7 @@ from linkwind.log.contents import (
     END,
     FRAMES,
     MOTION,
+    PROGRAMS,
     RETURNS,
     STATE,
     STEP,
@@ -41,7 +42,7 @@ class PublishedLog:
         """Write to ``log``, publish on ``stream``."""
         self._log, self._stream, self._run = log, stream, run
         self._numbers: Counter[str] = Counter()
-        self.scene, self.diagnostics = log.scene, log.diagnostics
+        self.scene, self.diagnostics, self.programs = log.scene, log.diagnostics, log.programs
 
     def motion(self, payload: bytes, time_ns: int) -> None:
         self._log.motion(payload, time_ns)
@@ -88,6 +89,6 @@ class PublishedLog:
     ) -> None:
         self._log.close(error=error)
         records = self._log.records
-        later = {name: records[name] for name in (DIAGNOSTICS, RETURNS, END) if name in records}
+        later = {name: records[name] for name in (DIAGNOSTICS, PROGRAMS, RETURNS, END) if name in records}
         self._stream.end(ending(later, self._numbers))
         self._stream.linger()

@@ -29,6 +29,7 @@ SCENARIO = "scenario.json"  # attachment: the resolved scenario
 RUN = "linkwind"  # metadata: run id, bodies, schema hash and what the caller adds
 VERSIONS = "linkwind.versions"  # metadata: versions of the programs, processor
 DIAGNOSTICS = "linkwind.diagnostics"  # metadata: names of each provider's own numbers; missing without any
+PROGRAMS = "linkwind.programs"  # metadata: program and version of each provider, as it said
 RETURNS = "linkwind.returns"  # metadata: providers that were lost and came back; missing without any
 HEARD = "linkwind.heard"  # metadata: what a listener has missed; missing in a log of the dynamics' own
 END = "linkwind.end"  # metadata: how the run ended; missing when the writer was killed
@@ -38,6 +39,8 @@ RESUMED_STEP, CHANGES = "resumed_step", "changes"  # after which step it went on
 SUBSTITUTED = "substituted"  # which side was live, DYNAMICS or the name of a provider
 RECORD = "recorded_log"  # the file that the other side comes from
 DYNAMICS = "dynamics"
+
+OURS = "linkwind "  # how a provider of linkwind's begins in PROGRAMS
 
 
 def providers(kind: str, topics: Iterable[str]) -> tuple[str, ...]:

@@ -113,6 +113,16 @@ class Head:
         record = self.record(contents.DIAGNOSTICS)
         return {provider: tuple(json.loads(names)) for provider, names in record.items()}
 
+    @property
+    def foreign(self) -> dict[str, str]:
+        """The providers that were programs of somebody else, and which, for people."""
+        programs = self.record(contents.PROGRAMS)
+        return {
+            name: program or "a program that did not say which"
+            for name, program in programs.items()
+            if not program.startswith(contents.OURS)
+        }
+
     def _known(self, value: str | None, what: str) -> str:
         if value is None:
             text = self.damage.text if self.damage else "a log without it"

@@ -17,6 +17,8 @@ def origin(log: Log) -> Iterator[str]:
         if "sha256" in own:
             file = own.get("source", "an FMU")
             yield f'the forces of "{provider["name"]}" come from {file} with SHA-256 {own["sha256"]}'
+    for name, program in log.foreign.items():
+        yield f'the forces of "{name}" come from a program that is not linkwind\'s: {program}'
     record = metadata.get(contents.RECORD)
     if contents.RESUMED_STEP in metadata:
         yield f"resumed after step {metadata[contents.RESUMED_STEP]} of run {metadata['resumed_run']}"

@@ -66,7 +66,7 @@ def recover(
 
 def _write(log: Log, file: IO[bytes], progress: Callable[[int], None]) -> int:
     copy = CopyWriter(file, "linkwind log recover")
-    for name in (contents.RUN, contents.VERSIONS, contents.DIAGNOSTICS, contents.HEARD):
+    for name in (contents.RUN, contents.VERSIONS, contents.DIAGNOSTICS, contents.PROGRAMS, contents.HEARD):
         if record := log.record(name):
             copy.record(name, record)
     if log.has_scenario:

@@ -217,6 +217,10 @@ class LogWriter:
         if record:
             self._write_record(contents.DIAGNOSTICS, record)
 
+    def programs(self, programs: Mapping[str, str]) -> None:
+        """Record which program each provider is, as it says."""
+        self._write_record(contents.PROGRAMS, dict(programs))
+
     def returned(self, provider: str, step: int, after_s: float) -> None:
         """Record that a provider was lost at a step and came back after some time [s].
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from linkwind import __version__
 from linkwind.errors import FaultError, LinkwindError, ProtocolError
 from linkwind.schema import MESSAGES
 
 Control = MESSAGES["Control"]
+PROGRAM = f"linkwind {__version__}"  # Hello.version of linkwind's own providers
 
 
 def fault(participant: str, step: int, iteration: int, error: BaseException) -> bytes:

@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from linkwind import __version__
 from linkwind.errors import LinkwindError, LostError, MismatchError, RefusedError
 from linkwind.messages import KINDS, WrenchMessage
-from linkwind.protocol.control import Control, fault_error, parse, refuse
+from linkwind.protocol.control import PROGRAM, Control, fault_error, parse, refuse
 from linkwind.protocol.past import Past
 from linkwind.schema import SHA256
 from linkwind.spatial import Wrench
@@ -22,6 +21,7 @@ class Participant:
     name: str
     bodies: tuple[int, ...]
     instance: str = ""
+    program: str = ""  # and its version, as it says
     ready: bool = False
     bye: bool = False
     answered: bool = False
@@ -152,15 +152,15 @@ class HandShake:
             raise RefusedError(f'a participant named "{hello.name}" already takes part in run {self.run}')
         if hello.schema_sha256 != SHA256:
             reason = (
-                f'participant "{hello.name}": expected schema {SHA256[:12]} (linkwind {__version__}); got '
-                f"{hello.schema_sha256[:12]} (linkwind {hello.version}). Install the same version on both "
-                "sides."
+                f'participant "{hello.name}": expected schema {SHA256[:12]} ({PROGRAM}); got '
+                f"{hello.schema_sha256[:12]} ({hello.version or 'no program named'}). Install the same "
+                "version on both sides."
             )
             self.failure = RefusedError(reason)
             raise self.failure
         if known.message is None:
             self._begin(known)
-        known.instance = hello.instance
+        known.instance, known.program = hello.instance, hello.version
         body = {
             "run": self.run,
             "scenario_json": self._scenario_json,

@@ -9,11 +9,10 @@ from collections.abc import Callable
 from enum import Enum, auto
 from typing import Any
 
-from linkwind import __version__
 from linkwind.errors import ProtocolError, RefusedError
 from linkwind.frames import Frame, Sent
 from linkwind.messages import KINDS, MotionMessage, WrenchMessage
-from linkwind.protocol.control import Control, fault, parse
+from linkwind.protocol.control import PROGRAM, Control, fault, parse
 from linkwind.protocol.memory import Memory, Model
 from linkwind.protocol.past import digest
 from linkwind.schema import SHA256
@@ -61,7 +60,7 @@ class ProviderSession:
         body = {
             "name": self.name,
             "schema_sha256": SHA256,
-            "version": __version__,
+            "version": PROGRAM,
             "instance": self.instance,
         }
         return bytes(Control(hello=body).SerializeToString())

@@ -60,6 +60,9 @@ class Comparison:
     def diagnostics(self, names: Mapping[str, Sequence[str]]) -> None:
         """Names follow from the scenario and the program."""
 
+    def programs(self, programs: Mapping[str, str]) -> None:
+        """Here they are linkwind's."""
+
     def ahead(self, step: int, count: int) -> Recording:
         """Return what the messages of steps have to be; see :class:`linkwind.dynamics.march.Record`."""
         time_ns, topics = step * self._step_ns, [MOTION, *self._wrenches.values(), STATE, STEP]

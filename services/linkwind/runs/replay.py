@@ -23,6 +23,7 @@ from linkwind.log.contents import (
     END,
     FRAMES,
     MOTION,
+    PROGRAMS,
     RUN,
     STATE,
     STEP,
@@ -209,7 +210,7 @@ class _Reel:
 
     def _ending(self) -> bytes:
         counts = {topic: self._log.topics.get(topic, 0) for topic in self._topics}
-        return ending(_records(self._log, DIAGNOSTICS, END), counts)
+        return ending(_records(self._log, DIAGNOSTICS, PROGRAMS, END), counts)
 
 
 def points(log: Log, topics: Sequence[str], low: int, high: float) -> Iterator[tuple[int, list[Sent]]]:

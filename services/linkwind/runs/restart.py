@@ -139,7 +139,7 @@ def _unfinished(scenario: Scenario, tell: Callable[[str], None]) -> Path | None:
 
 
 def _logs(scenario: Scenario) -> list[Path]:
-    """Return the logs under ``runs/`` in folders that are named as those of a scenario's runs, newest first."""
+    """Return the logs under ``runs/`` in folders named as those of a scenario's runs, newest first."""
     name = re.compile(re.escape(scenario.name) + r"-\d{8}-\d{6}(-\d+)?")
     logs = [log for log in Path("runs").glob(f"*/{LOG}") if name.fullmatch(log.parent.name)]
     return sorted(logs, key=lambda log: log.stat().st_mtime_ns, reverse=True)

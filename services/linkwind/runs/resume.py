@@ -155,9 +155,15 @@ def resume(
         report: make the page of the run.
 
     Raises:
+        InputError: a provider was not linkwind's, so that it cannot be started here.
         MismatchError: what was recorded does not come out again here.
         LinkwindError: the run ended early; its log and report tell as well.
     """
+    for name, program in found.log.foreign.items():
+        raise InputError(
+            f'{found.log.path}: provider "{name}": expected a model of linkwind; got {program}. Let it come '
+            "from elsewhere: --listen ENDPOINT."
+        )
     service, beginning = _continued(found)
     folder = folders.create(found.scenario.name, out)
     done = with_providers(service, folder, progress, own, beginning, tls, watch, report=report)

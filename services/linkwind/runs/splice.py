@@ -120,7 +120,8 @@ class ContinuedLog:
         self._writer, self._log, self._record, self._comparison = writer, log, record, comparison
         self._last_ns = last * step_ns
         self._successor = successor
-        self.scene, self.diagnostics, self.wrench = log.scene, log.diagnostics, log.wrench
+        self.scene, self.wrench = log.scene, log.wrench
+        self.diagnostics, self.programs = log.diagnostics, log.programs
 
     def motion(self, payload: bytes, time_ns: int) -> None:
         """Write a motion."""

@@ -82,14 +82,21 @@ def verify(
         InputError: the log's scenario cannot be run here, or the user's own model is missing or another one.
         StoppedError: Ctrl-C or SIGTERM.
     """
-    recorded = from_recorded_wrenches or log.metadata.get(SUBSTITUTED) == DYNAMICS
+    foreign = ", ".join(f'"{name}" ({program})' for name, program in log.foreign.items())
+    recorded = from_recorded_wrenches or bool(foreign) or log.metadata.get(SUBSTITUTED) == DYNAMICS
     if not recorded:
         live = log.metadata.get(SUBSTITUTED)
         refuse_missing(scenario, own, list(log.provider_bodies) if live is None else [live])
     mechanism = build(scenario)
     comparison = Comparison(log, scenario, mechanism, wrenches=not recorded)
     link, again = _again(log, scenario, mechanism, comparison, own, recorded=recorded)
-    remark = "" if log.complete else _why(log)
+    remarks = [] if log.complete else [_why(log)]
+    if foreign:
+        remarks.append(
+            f"the forces of {foreign} were taken as recorded, as by --from-recorded-wrenches: they came from "
+            "a program that is not linkwind's"
+        )
+    remark = "; ".join(remarks)
     difference: Difference | None = None
     with closing(link):
         try:

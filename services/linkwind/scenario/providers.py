@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, Literal
+from dataclasses import replace
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
 
 from linkwind.scenario.polars import COLUMNS, Rows
-from linkwind.scenario.problems import Problem, ProblemError
+from linkwind.scenario.problems import Problem, ProblemError, choice, nearest
 from linkwind.scenario.quantities import Name, Section, Vector, quantity
 
 AeroModel = Literal["none", "field", "plate", "flow", "vortex", "fmu", "python"]
@@ -19,6 +20,10 @@ ADDING_INERTIA: tuple[AeroModel, ...] = (
     "fmu",
     "python",
 )  # that may move massless bodies
+EXTERNAL = (
+    'Use one of these; for a program of your own that keeps to schemas/README.md "none": it takes part under '
+    "the provider's name."
+)
 PlateCoefficients = Literal["ristroph", "andersen", "table"]
 
 
@@ -260,11 +265,20 @@ class PythonModel(Section):
     )
 
 
+def _model(value: Any) -> Any:
+    words = get_args(AeroModel)
+    if value in words:
+        return value
+    problem = choice((), "one of", words, value)
+    near = isinstance(value, str) and nearest(value, words) is not None
+    raise ProblemError([problem if near else replace(problem, advice=EXTERNAL)])
+
+
 class Provider(Section):
     """A participant that answers a motion with the wrench on its bodies."""
 
     name: Name = Field(description="Name, a letter followed by letters, digits and _")
-    model: AeroModel = Field(description="Force model")
+    model: Annotated[AeroModel, BeforeValidator(_model)] = Field(description="Force model")
     bodies: tuple[Name, ...] = Field(
         default=(), strict=False, min_length=1, description="Names of the bodies it acts on; default: all"
     )

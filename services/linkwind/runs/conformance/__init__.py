@@ -128,8 +128,8 @@ def conformance(
     if not any("{endpoint}" in word for word in command):
         line = shlex.join(command)
         raise InputError(
-            f"the provider's command: expected {{endpoint}} in it, for where the dynamics listens; got: {line}. "
-            f"Add it where the program takes its endpoint: linkwind conformance SCENARIO -- {line} {{endpoint}}"
+            f"the command: expected {{endpoint}} in it, for where the dynamics listens; got: {line}. "
+            f"Add it where the program takes it: linkwind conformance SCENARIO -- {line} {{endpoint}}"
         )
     provider, findings = Provider.of(scenario, name, command, output, STEPS), Findings(progress)
     for number, life in enumerate((_whole, _resumed, _killed, _gap, _ended)):

@@ -69,7 +69,7 @@ class Provider:
             return subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT)
 
     def last_words(self) -> str:
-        """Return the last line that the last process has printed, as the end of a sentence; empty for none."""
+        """Return the last line that the last process has printed, to end a sentence; empty for none."""
         printed = self.output.read_bytes()[self.begins[-1] :].decode(errors="replace")
         lines = [line.strip() for line in printed.splitlines() if line.strip()]
         return f"; the last that it printed: {lines[-1][:LONGEST]}" if lines else ""
