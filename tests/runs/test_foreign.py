@@ -16,6 +16,7 @@ from linkwind.errors import FaultError, InputError
 from linkwind.log.contents import PROGRAMS
 from linkwind.log.origin import origin
 from linkwind.log.reader import open_log
+from linkwind.runs.live_provider import live_provider
 from linkwind.runs.resume import plan, resume
 from linkwind.runs.run import Ends, Outcome, dynamics, run
 from linkwind.runs.verify import scenario_of, verify
@@ -72,8 +73,7 @@ def test_an_error_in_the_forces_is_told_and_ends_the_process(tmp_path: Path) -> 
         waiting.join()
     assert ended[0] - over < 2.0
     assert process.returncode == 1
-    assert process.stderr is not None
-    printed = process.stderr.read()
+    _, printed = process.communicate()
     assert printed.startswith("Traceback")
     assert printed.endswith("ZeroDivisionError: division by zero\n")
 
@@ -111,6 +111,22 @@ def test_a_dynamics_that_gives_other_states_is_still_found(foreign: Path, tmp_pa
     found = verify(log, scenario)
     assert found.difference is not None
     assert found.difference.topic == "/state"
+
+
+def test_its_answers_to_recorded_motion_cannot_be_made_again(foreign: Path, tmp_path: Path) -> None:
+    recorded, endpoint = open_log(foreign), loopback_endpoint()
+    process = start(EXAMPLE, endpoint)
+    try:
+        _, scenario = scenario_of(foreign)
+        done = live_provider(
+            recorded, "aero", scenario, {}, tmp_path / "out", lambda step: None, listen=[endpoint]
+        )
+    finally:
+        _, printed = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 0, printed
+    log, scenario = scenario_of(done.log)
+    with pytest.raises(InputError, match=r'those of "aero" \(provider.py 1\) against recorded motion'):
+        verify(log, scenario)
 
 
 def test_it_is_not_resumed_with_a_model_of_linkwinds(foreign: Path, tmp_path: Path) -> None:

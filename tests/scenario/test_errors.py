@@ -55,8 +55,8 @@ WRONG = [
      "got 0.0001. Take ten steps or more."),
     ('model = "plate"', 'model = "lbm"',
      'aero.model: expected one of none, field, plate, flow, vortex, fmu, python; got "lbm". '
-     'Use one of these; for a program of your own that keeps to schemas/README.md "none": it takes part under '
-     "the provider's name."),
+     'Use one of these; for a program of your own that keeps to schemas/README.md "none": it takes part '
+     "under the provider's name."),
     # types
     ("mass = 2.0", 'mass = "2 kg"',
      'bodies[0] "link1".mass: expected a number [kg]; got "2 kg". Write the number alone, without '

@@ -79,13 +79,19 @@ def verify(
 
     Raises:
         LogError: there is nothing to compare.
-        InputError: the log's scenario cannot be run here, or the user's own model is missing or another one.
+        InputError: the log's scenario cannot be run here, or the user's own model is missing or another one,
+            or a program that is not linkwind's answered recorded motion.
         StoppedError: Ctrl-C or SIGTERM.
     """
+    live = log.metadata.get(SUBSTITUTED)
+    if live in log.foreign:
+        raise InputError(
+            f'{log.path}: expected forces that linkwind can make again; got those of "{live}" '
+            f"({log.foreign[live]}) against recorded motion. Ask it again: linkwind replay --substitute."
+        )
     foreign = ", ".join(f'"{name}" ({program})' for name, program in log.foreign.items())
-    recorded = from_recorded_wrenches or bool(foreign) or log.metadata.get(SUBSTITUTED) == DYNAMICS
+    recorded = from_recorded_wrenches or bool(foreign) or live == DYNAMICS
     if not recorded:
-        live = log.metadata.get(SUBSTITUTED)
         refuse_missing(scenario, own, list(log.provider_bodies) if live is None else [live])
     mechanism = build(scenario)
     comparison = Comparison(log, scenario, mechanism, wrenches=not recorded)
