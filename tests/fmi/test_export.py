@@ -19,7 +19,7 @@ from linkwind.fmi.data import source
 from linkwind.fmi.export import content_of, export
 from linkwind.fmi.part import aero_part, dynamics_part
 from linkwind.fmi.peers import MISSING
-from linkwind.scenario import load
+from linkwind.scenario import load, loads
 from tests.fmi.conftest import FORMS, scenario
 
 
@@ -84,6 +84,31 @@ def test_check_finds_nothing_and_references_are_met_to_the_last_bit(fmu, part, f
 )
 def test_references_of_other_models(fmu, name, part, fmi):
     assert reference_error(fmu(name, fmi, part)) == 0.0
+
+
+@pytest.mark.parametrize("fmi", ["2", "3"])
+def test_a_motion_by_table_has_the_bits_of_the_core(tmp_path, fmi):
+    table = "{ table = [[0, 0], [0.05, 0.3], [0.07, 0.1], [0.1, 1e-17]], periodic = true }"
+    text = f"""
+[time]
+end = 0.2
+[[bodies]]
+name = "arm"
+mass = 1.0
+inertia = 0.1
+[[joints]]
+name = "pin"
+type = "revolute"
+parent = "world"
+child = "arm"
+[[forces]]
+type = "motion"
+name = "beat"
+joint = "pin"
+position = {table}
+"""
+    made = export(loads(text, "beat.toml"), tmp_path / "beat.fmu", fmi=fmi)
+    assert reference_error(made.file) == 0.0
 
 
 def test_check_notices_wrong_references(fmu, tmp_path):

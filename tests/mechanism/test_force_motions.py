@@ -303,6 +303,110 @@ def test_a_motion_may_be_a_table_that_begins_again():
     assert abs(runs[1].residual) < 0.6 * abs(runs[0].residual)
 
 
+def law(position, end=1.0):
+    """What a motion is at a time: value, rate, acceleration."""
+    flap = FLAP | {"position": position}
+    tables = build(scenario([ROD], [PIN], [flap], time={"end": end})).tables
+    return lambda t: derivatives(tables.force_code, tables.force_constants, t)
+
+
+def sine(count, periodic=True):
+    """Rows of a sine over a period, whose last value is not quite 0."""
+    t = np.linspace(0.0, 1.0, count)
+    return {"table": np.transpose([t, np.sin(2.0 * np.pi * t + 0.3)]).tolist(), "periodic": periodic}
+
+
+def test_a_motion_by_table_has_the_acceleration_of_the_curve():
+    """Peak acceleration of a sine, 4 pi²; a monotone cubic through the 51 rows has more than twice that."""
+    times = np.linspace(0.0, 2.0, 4001)
+    peaks = []
+    for more in ({}, {"interpolation": "cubic"}):
+        at = law(sine(51) | more)
+        peaks.append(max(abs(at(t)[2]) for t in times) / (4.0 * np.pi**2))
+    assert peaks[0] == pytest.approx(1.0, abs=0.005)
+    assert peaks[1] > 2.0
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_a_spline_is_of_fourth_order_up_to_its_ends(periodic):
+    times = np.linspace(0.0, 1.0, 801)
+    exact = np.sin(2.0 * np.pi * times + 0.3)
+    errors = []
+    for count in (51, 101, 201):
+        at = law(sine(count, periodic))
+        errors.append(np.abs([at(t)[0] for t in times] - exact).max())
+    assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx(4.0, abs=0.25)
+
+
+def test_a_spline_through_a_cubic_is_the_cubic():
+    """Not a knot: no error, with rows at any distances; of three rows the parabola, of two the line."""
+    for degree, places in ((3, [0.0, 0.1, 0.4, 0.5, 0.85, 1.0]), (3, [0.0, 0.3, 0.4, 1.0]),
+                           (2, [0.0, 0.4, 1.0]), (1, [0.0, 1.0])):  # fmt: skip
+        curve = np.polynomial.Polynomial([0.3, -1.0, 2.0, -4.0][: degree + 1])
+        at = law({"table": [[t, curve(t)] for t in places]})
+        for t in (0.0, 0.05, 0.4, 0.7, 1.0):
+            expected = [curve(t), curve.deriv()(t), curve.deriv(2)(t)]
+            np.testing.assert_allclose(at(t), expected, atol=1e-11)
+
+
+def test_a_spline_that_begins_again_has_no_jump():
+    """Two derivatives from both sides of each row, at uneven places, and at the seam; also of two pieces."""
+    for places in ([0.0, 0.1, 0.45, 0.6, 1.0], [0.0, 0.3, 1.0]):
+        values = [*[0.2, 1.0, -0.5, 0.1][: len(places) - 1], 0.2]
+        at = law({"table": list(map(list, zip(places, values, strict=True))), "periodic": True})
+        for t in (*places[1:], 7.0 + places[1]):
+            before, after = at(t - 1e-9), at(t + 1e-9)
+            np.testing.assert_allclose(before, after, atol=1e-5)
+
+
+def test_a_motion_keeps_its_rate_at_the_end_of_the_run():
+    """Sums of steps may pass the last row by round-off: 3 * 0.1 > 0.3."""
+    at = law({"table": [[0.0, 0.0], [0.1, 0.1], [0.2, 0.2], [0.3, 0.3]]}, end=0.3)
+    assert 3 * 0.1 > 0.3
+    assert at(3 * 0.1)[1] == pytest.approx(1.0, abs=1e-12)
+
+
+def test_a_motion_that_rests_is_held():
+    """Half a cosine and a last row for the rest: flat there and after, of fourth order before."""
+    errors = []
+    for count in (11, 21, 41):
+        t = np.linspace(0.0, 0.5, count)
+        rows = np.transpose([t, 1.0 - np.cos(2.0 * np.pi * t)]).tolist()
+        at = law({"table": [*rows, [0.6, 2.0]]}, end=5.0)
+        for after in (0.5, 0.55, 0.6, 3.0):
+            assert at(after)[:2] == (2.0, 0.0)
+        inside = np.linspace(0.2, 0.4999, 300)
+        errors.append(max(abs(at(s)[0] - 1.0 + np.cos(2.0 * np.pi * s)) for s in inside))
+    assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx(4.0, abs=0.3)
+
+
+def test_what_should_begin_again_does_but_for_round_off():
+    """sin(2 pi) is -2e-16: the last value becomes the first; what is more than round-off is refused."""
+    t = np.linspace(0.0, 1.0, 21)
+    rows = np.transpose([t, np.sin(2.0 * np.pi * t)]).tolist()
+    assert rows[-1][1] != rows[0][1]
+    case = scenario([ROD], [PIN], [FLAP | {"position": {"table": rows, "periodic": True}}])
+    assert case.forces[0].position.table[-1] == (1.0, 0.0)
+    assert case.forces[0].position.table[:-1] == tuple(map(tuple, rows[:-1]))
+    assert from_json(case.to_json()) == case
+    rows[-1][1] = 1e-8
+    with pytest.raises(ScenarioError, match=r"table\[20\]: expected the first value again, 0\.0"):
+        scenario([ROD], [PIN], [FLAP | {"position": {"table": rows, "periodic": True}}])
+
+
+@pytest.mark.parametrize(
+    ("table", "got"),
+    [
+        ([[0.0, 0.0], [0.5, 1.0]], r"got 0\.0 to 0\.5 s, with a rate of 2 at 0\.5 s\. Add rows, repeat it"),
+        ([[0.2, 0.0], [1.0, 1.6]], r"got 0\.2 to 1\.0 s, with a rate of 2 at 0\.2 s\."),
+        ([[0.0, 0.0], [0.4, 0.2], [0.8, 0.8]], r"with a rate of 2 at 0\.8 s\."),
+    ],
+)
+def test_a_motion_that_would_stop_dead_is_refused(table, got):
+    with pytest.raises(MechanismError, match=r'forces\[0\] "flap"\.position\.table: expected times .*' + got):
+        build(scenario([ROD], [PIN], [FLAP | {"position": {"table": table}}]))
+
+
 def test_a_spring_by_table_is_the_spring():
     spring = {"type": "spring", "name": "s", "parent": "world", "child": "ball"}
     start = BALL | {"position": [1.0, 0.5]}
@@ -349,13 +453,14 @@ MOTOR = {"type": "actuator", "name": "motor", "joint": "pin", "force": "0"}
          r'neither'),
         ([MOTOR | {"force": {"table": [[0, 0], [0, 1]]}}], r"force\.table\[1\]: expected a variable above"),
         ([MOTOR | {"force": {"table": [[0, 0]]}}], r"force\.table: expected at least one entry"),
-        ([MOTOR | {"force": {"table": [[0, 0], [1, 1]], "periodic": True}}], r"\[1\]: expected a last value"),
+        ([MOTOR | {"force": {"table": [[0, 0], [1, 1]], "periodic": True}}], r"\[1\]: expected the first value"),
         ([MOTOR | {"coordinate": 1}], r'forces\[0\] "motor"\.coordinate: expected 0, because a revolute'),
         ([MOTOR | {"force": "2*x"}], r'forces\[0\] "motor"\.force: column 3: expected one of t, q, v'),
         ([FLAP | {"position": "sin(x)"}], r'expected one of t, pi; got "x"\. Use one of these\.'),
         ([FLAP | {"position": "sin(t"}], r'forces\[0\] "flap"\.position: expected an expression'),
         ([FLAP | {"position": "log(t)"}], r'forces\[0\] "flap"\.position: expected a number with a rate'),
-        ([FLAP | {"position": {"table": [[0, 0], [1, 1]]}}], r'interpolation: expected "cubic"'),
+        ([FLAP | {"position": {"table": [[0, 0], [1, 1]], "interpolation": "linear"}}],
+         r'interpolation: expected "spline"'),
         ([FLAP, FLAP | {"name": "g"}], r'forces\[1\] "g"\.joint: expected a coordinate without another '
          r'motion'),
         ([{"type": "buoyancy", "name": "b", "body": "arm"}], r'forces\[0\] "b"\.volume: .*arm has no shape'),

@@ -189,7 +189,7 @@ def test_zero_mass_needs_a_model_that_adds_inertia():
     assert str(error.value) == (
         'x: bodies[0] "link1".mass: expected a number above 0 [kg], because no provider adds inertia to '
         "this body; "
-        "got 0.0. Give it a mass, or the model plate or flow."
+        "got 0.0. Give it a mass, however small, or the model plate, flow or vortex."
     )
 
 

@@ -39,7 +39,7 @@ def curves(rows: Sequence[Sequence[float]]) -> Array:
         points = np.hstack([_mirrored(points[:, 1:], 0.0), points])
     place = np.radians(points[0]).tolist()
     each = [tuple(zip(place, values.tolist(), strict=True)) for values in points[1:]]
-    return np.array([Curve(through, smooth=True, periodic=True).layout() for through in each])
+    return np.array([Curve(through, "cubic", periodic=True).layout() for through in each])
 
 
 def _mirrored(points: Array, about: float) -> Array:

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
+from linkwind.expression.spline import slopes
 from linkwind.spatial import Array
+
+# How far the last piece of a spline goes on, in parts of its length: a time that is a sum of steps may be a
+# little after the last place, where a rate must not fall to zero yet.
+BEYOND = 1e-9
 
 
 @dataclass(frozen=True)
@@ -15,12 +21,12 @@ class Curve:
 
     Attributes:
         points: places, ascending, and values.
-        smooth: monotone cubic, with a continuous derivative; else straight lines.
+        interpolation: linear; cubic, monotone with a continuous derivative; or spline, with two of them.
         periodic: goes on as it was; the last value is the first.
     """
 
     points: tuple[tuple[float, float], ...]
-    smooth: bool = False
+    interpolation: Literal["linear", "cubic", "spline"] = "linear"
     periodic: bool = False
 
     def layout(self) -> list[float]:
@@ -29,13 +35,31 @@ class Curve:
         width, slope = np.diff(x), np.diff(y) / np.diff(x)
         pieces = np.zeros((len(width), 4))
         pieces[:, 0], pieces[:, 1] = y[:-1], slope
-        if self.smooth:
-            at = _monotone(width, slope, periodic=self.periodic)
+        if self.interpolation != "linear":
+            at = self._slopes()
             pieces[:, 1] = at[:-1]
             pieces[:, 2] = (3.0 * slope - 2.0 * at[:-1] - at[1:]) / width
             pieces[:, 3] = (at[:-1] + at[1:] - 2.0 * slope) / width**2
         period = float(x[-1] - x[0]) if self.periodic else 0.0
-        return [float(len(width)), period, *x.tolist(), *pieces.ravel().tolist()]
+        return [float(len(width)), period, *x[:-1].tolist(), self.end, *pieces.ravel().tolist()]
+
+    @property
+    def end(self) -> float:
+        """Up to where the curve is no constant yet."""
+        first, last = self.points[0][0], self.points[-1][0]
+        goes_on = self.interpolation == "spline" and not self.periodic
+        return last + BEYOND * (last - first) if goes_on else last
+
+    def end_rates(self) -> tuple[float, float]:
+        """Return the derivatives at the ends of a curve that is not linear, from within."""
+        at = self._slopes()
+        return float(at[0]), float(at[-1])
+
+    def _slopes(self) -> Array:
+        if self.interpolation == "spline":
+            return np.array(slopes(self.points, periodic=self.periodic))
+        x, y = np.array(self.points).T
+        return _monotone(np.diff(x), np.diff(y) / np.diff(x), periodic=self.periodic)
 
 
 def _monotone(width: Array, slope: Array, *, periodic: bool) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from linkwind.scenario.functions import Function
 from linkwind.scenario.shapes import signed_area
 from linkwind.spatial import Array, Motion
 
+RESTS = 1e-6  # rate of a motion that rests, in parts of its fastest
 SHORTEST = 1e-9  # m between the ends of a spring at the start
 ORIGIN = (0.0, 0.0, 0.0)
 VARIABLES = {
@@ -119,7 +121,9 @@ def _element(force: Force, scenario: Scenario, carriers: list[Carrier], start: M
             )
         case Prescribed():
             return Element(
-                force.type, _coordinate(force, carriers, item), program=motion_program(force, item)
+                force.type,
+                _coordinate(force, carriers, item),
+                program=motion_program(force, scenario.time.end, item),
             )
         case PointForce():
             numbers = (float(force.frame == "body"), 0.0, 0.0)
@@ -146,7 +150,7 @@ def prescribed(scenario: Scenario, carriers: list[Carrier]) -> dict[str, dict[in
             continue
         item = scenario.where("forces", i)
         _coordinate(force, carriers, item)
-        program = motion_program(force, item)
+        program = motion_program(force, scenario.time.end, item)
         start = derivatives(program.code, program.constants, 0.0)
         if not all(map(math.isfinite, start)):
             raise MechanismError(
@@ -161,19 +165,43 @@ def prescribed(scenario: Scenario, carriers: list[Carrier]) -> dict[str, dict[in
 # ---- functions ----
 
 
-def motion_program(motion: Prescribed, item: str) -> Program:
-    """Return the program of a prescribed coordinate; ``item``: where it stands, for errors.
+def motion_program(motion: Prescribed, end: float, item: str) -> Program:
+    """Return the program of a prescribed coordinate.
+
+    Args:
+        motion: the element.
+        end: of the run [s].
+        item: where it stands, for errors.
 
     Raises:
         ExpressionError: the expression is wrong.
-        MechanismError: a table whose corners would be jumps of the velocity.
+        MechanismError: a table in which the velocity would jump, at its corners or where it ends.
     """
-    if motion.position.table is not None and motion.position.interpolation == "linear":
-        raise MechanismError(
-            f'{item}.position.interpolation: expected "cubic", because a motion without kinks is needed for '
-            'its acceleration; got "linear". Use "cubic".'
-        )
+    if motion.position.table is not None:
+        if motion.position.interpolation == "linear":
+            raise MechanismError(
+                f'{item}.position.interpolation: expected "spline", because a motion without kinks is needed '
+                'for its acceleration; got "linear". Use "spline".'
+            )
+        _check_ends(_curve(motion.position), end, item)
     return _program(motion, ("position",), item)
+
+
+def _check_ends(curve: Curve, end: float, item: str) -> None:
+    """A table is held beyond its ends, where it has to be at rest."""
+    if curve.periodic:
+        return
+    first, last = curve.points[0][0], curve.points[-1][0]
+    fastest = max(abs(b - a) / (after - before) for (before, a), (after, b) in pairwise(curve.points))
+    rates = curve.end_rates()
+    for held, place, rate in ((first > 0.0, first, rates[0]), (curve.end < end, last, rates[1])):
+        if held and abs(rate) > RESTS * fastest:
+            raise MechanismError(
+                f"{item}.position.table: expected times from 0 to the end of the run, {end!r} s, "
+                "because the velocity would jump where the table is held; got "
+                f"{first!r} to {last!r} s, with a rate of {rate:.6g} at {place!r} s. Add rows, repeat it "
+                "(periodic = true), or let it rest there: two rows with the same value."
+            )
 
 
 def inputs(force: Force) -> dict[str, float]:
@@ -201,7 +229,12 @@ def _program(force: Force, keys: tuple[str, ...], item: str) -> Program:
 def _law(function: Function) -> str | Curve:
     if function.table is None:
         return function.expression or ""
-    return Curve(function.table, function.interpolation == "cubic", function.periodic)
+    return _curve(function)
+
+
+def _curve(function: Function) -> Curve:
+    assert function.table is not None
+    return Curve(function.table, function.interpolation, function.periodic)
 
 
 # ---- springs ----

@@ -235,7 +235,7 @@ def _masses(scenario: Scenario) -> Iterator[Problem]:
     for index, body in enumerate(scenario.bodies):
         if body.name not in given:
             expected = "a number above 0 [kg], because no provider adds inertia to this body"
-            advice = "Give it a mass, or the model plate or flow."
+            advice = "Give it a mass, however small, or the model plate, flow or vortex."
             yield Problem(("bodies", index, "mass"), expected, show(body.mass), advice)
         elif body.name not in {*parents, *parents.values()} and _spins_freely(body):
             expected = "principal moments above 0, because nothing holds or hangs on this body"

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, WithJsonSchema
 
-from linkwind.scenario.functions import AnyFunction
+from linkwind.scenario.functions import AnyFunction, AnyMotion
 from linkwind.scenario.providers import Definitions
 from linkwind.scenario.quantities import Name, Section, Vector, quantity
 
@@ -63,7 +63,10 @@ class Motion(Section):
     name: Name = Field(description=_NAME)
     joint: str = Field(description="Name of a revolute, prismatic or planar joint that carries a body")
     coordinate: int = Field(default=0, ge=0, le=2, description=_COORDINATE)
-    position: AnyFunction = Field(description="Angle or displacement, rad or m, of t; a table: of t")
+    position: AnyMotion = Field(
+        description="Angle or displacement, rad or m, of t; a table: of t, periodic, or from 0 to the end of "
+        "the run, or to a rest: two equal values"
+    )
 
 
 class PointForce(Section):

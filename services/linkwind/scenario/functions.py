@@ -2,44 +2,32 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, model_validator
 from pydantic_core import CoreSchema
 
-from linkwind.scenario.problems import Problem, ProblemError, show
-from linkwind.scenario.quantities import Section, numbers, quantity
-
-
-def _point(value: Any) -> tuple[float, float]:
-    expected = "a list of 2 numbers [variable, value]"
-    if not isinstance(value, list | tuple) or len(value) != 2:
-        raise ProblemError.value(expected, value, "For example [0.1, -2.0].")
-    place, result = numbers(value, expected)
-    return place, result
-
-
-Point = Annotated[
-    tuple[float, float],
-    BeforeValidator(_point),
-    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}),
-]
+from linkwind.scenario.points import Points, wrong
+from linkwind.scenario.problems import Problem, ProblemError
+from linkwind.scenario.quantities import Section, quantity
 
 
 class Function(Section):
     """An expression, or a curve through points over the first variable; a text alone is the expression."""
 
     expression: str | None = Field(default=None, description="Expression of the variables")
-    table: tuple[Point, ...] | None = quantity(
-        "Points [variable, value] with ascending variables; beyond the ends their values hold",
+    table: Points | None = quantity(
+        "Points [variable, value] with ascending variables, or a CSV file of these two columns; beyond the "
+        "ends their values hold",
         "SI units",
         None,
         strict=False,
         min_length=2,
     )
-    interpolation: Literal["linear", "cubic"] = Field(
-        default="linear", description="linear; cubic: monotone between points, without kinks"
+    interpolation: Literal["linear", "cubic", "spline"] = Field(
+        default="linear",
+        description="linear; cubic: monotone between points, without kinks; spline: with a continuous second "
+        "derivative, the default of a motion",
     )
     periodic: bool = Field(default=False, description="The table begins again where it ends")
 
@@ -56,15 +44,11 @@ class Function(Section):
             got = "neither" if self.table is None else "both"
             raise ProblemError([Problem((), "an expression or a table", got, "Give one of the two.")])
         points = self.table or ()
-        for index, (before, after) in enumerate(pairwise(points)):
-            if not after[0] > before[0]:
-                expected = f"a variable above that of the point before, {before[0]!r}"
-                got, path = show(list(after)), ("table", index + 1)
-                raise ProblemError([Problem(path, expected, got, "Sort the points; each comes once.")])
-        if self.periodic and points and points[0][1] != points[-1][1]:
-            expected = f"a last value that is the first, {points[0][1]!r}, because it is periodic"
-            path = ("table", len(points) - 1)
-            raise ProblemError([Problem(path, expected, show(list(points[-1])), "Correct it.")])
+        if problems := list(wrong(points, periodic=self.periodic)):
+            raise ProblemError([problem.below(("table",)) for problem in problems])
+        if self.periodic and points and points[-1][1] != points[0][1]:
+            closed = (*points[:-1], (points[-1][0], points[0][1]))
+            return self.model_copy(update={"table": closed})
         return self
 
 
@@ -76,4 +60,13 @@ def _function(value: Any) -> Any:
     return {"expression": value} if isinstance(value, str) else value
 
 
+def _motion(value: Any) -> Any:
+    """Return a function whose table has, unless it says otherwise, the derivatives that a motion needs."""
+    value = _function(value)
+    if isinstance(value, dict) and value.get("table") is not None:
+        return {"interpolation": "spline"} | value
+    return value
+
+
 AnyFunction = Annotated[Function, BeforeValidator(_function)]
+AnyMotion = Annotated[Function, BeforeValidator(_motion)]

@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 from pydantic import ValidationError
 
 from linkwind.errors import ScenarioError
-from linkwind.scenario import polars, translation
+from linkwind.scenario import points, polars, translation
 from linkwind.scenario.agreement import disagreements
 from linkwind.scenario.model import Scenario
 from linkwind.scenario.overrides import override
@@ -149,12 +149,14 @@ def _scenario(data: dict[str, Any], name: str, overrides: Sequence[str], folder:
         data, shorthand = expand(copy.deepcopy(data), Path(name).stem)
         source = Source(name, shorthand, {}, data)
         polars.read(data, folder)
+        points.read(data, folder)
         for argument in overrides:
             try:
                 source.overridden[override(data, argument)] = argument
             except ProblemError as error:
                 _refuse(error.problems, replace(source, file=f"--set {argument}", overridden={}))
         polars.read(data, Path())
+        points.read(data, Path())
     except ProblemError as error:
         _refuse(error.problems, source)
     tables: dict[str, Any] = {}

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, WithJsonSchema
 
+from linkwind.scenario.cells import cells, refuse_wrong
 from linkwind.scenario.problems import Problem, ProblemError
 from linkwind.scenario.quantities import numbers
 
@@ -50,31 +49,16 @@ def read(data: dict[str, Any], folder: Path | None) -> None:
 
 def _file(path: Path, name: str) -> list[Row]:
     """Return the rows of a file, its columns by name in any order; lines that begin with # say nothing."""
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, ValueError) as error:  # ValueError: no UTF-8, or a null byte in the path
-        reason = error.strerror if isinstance(error, OSError) else "no text in UTF-8"
-        expected, got = f"a file with the columns {', '.join(COLUMNS)}", f"{path}: {reason}"
-        raise ProblemError([Problem((), expected, got, "Check the path.")]) from None
-    cells = [
-        (number, [cell.strip() for cell in next(csv.reader([line]))])
-        for number, line in enumerate(lines, 1)
-        if line.strip() and not line.startswith("#")
-    ]
-    head = cells[0][1] if cells else []
+    lines = cells(path, f"the columns {', '.join(COLUMNS)}")
+    head = lines[0][1] if lines else []
     for column in COLUMNS:
         if head.count(column) != 1:
             expected = f"the columns {', '.join(COLUMNS)} in the first line of {name}, each once"
             got, advice = ", ".join(head) or "nothing", f'Correct "{column}".'
             raise ProblemError([Problem((), expected, got, advice)])
-    places = [f"in line {number} of {name}" for number, _ in cells[1:]]
-    rows = [_row(head, row, place) for (_, row), place in zip(cells[1:], places, strict=True)]
-    wrong = []
-    for problem in _wrong(rows):
-        place = places[int(problem.path[0])] if problem.path else f"in {name}"
-        wrong.append(replace(problem, path=(), expected=f"{problem.expected} {place}"))
-    if wrong:
-        raise ProblemError(wrong)
+    places = [f"in line {number} of {name}" for number, _ in lines[1:]]
+    rows = [_row(head, row, place) for (_, row), place in zip(lines[1:], places, strict=True)]
+    refuse_wrong(_wrong(rows), name, places)
     return rows
 
 
