@@ -453,7 +453,7 @@ MOTOR = {"type": "actuator", "name": "motor", "joint": "pin", "force": "0"}
          r'neither'),
         ([MOTOR | {"force": {"table": [[0, 0], [0, 1]]}}], r"force\.table\[1\]: expected a variable above"),
         ([MOTOR | {"force": {"table": [[0, 0]]}}], r"force\.table: expected at least one entry"),
-        ([MOTOR | {"force": {"table": [[0, 0], [1, 1]], "periodic": True}}], r"\[1\]: expected the first value"),
+        ([MOTOR | {"force": {"table": [[0, 0], [1, 1]], "periodic": True}}], r"\[1\]: expected the first"),
         ([MOTOR | {"coordinate": 1}], r'forces\[0\] "motor"\.coordinate: expected 0, because a revolute'),
         ([MOTOR | {"force": "2*x"}], r'forces\[0\] "motor"\.force: column 3: expected one of t, q, v'),
         ([FLAP | {"position": "sin(x)"}], r'expected one of t, pi; got "x"\. Use one of these\.'),

@@ -18,9 +18,9 @@ Row = tuple[float, float, float, float]  # coefficients of the slope before, her
 def slopes(points: Sequence[tuple[float, float]], *, periodic: bool = False) -> list[float]:
     """Return the derivatives at the points.
 
-    A spline that is not periodic ends in a piece of no own cubic (not a knot): of fourth order up to the end,
-    where the natural one, without curvature, is of second. Where its first or last two values are the same it
-    rests: that piece is flat, and the others join it without a jump of the rate.
+    A spline that is not periodic has one cubic in its first two pieces, and one in its last two (not a knot):
+    of fourth order up to the ends, where the natural one, without curvature there, is of second. Where its
+    first or last two values are the same it rests: that piece is flat, and the others meet it at rate zero.
 
     Args:
         points: places, ascending, and values; at least two.
