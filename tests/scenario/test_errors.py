@@ -193,6 +193,13 @@ def test_zero_mass_needs_a_model_that_adds_inertia():
     )
 
 
+def test_what_carries_mass_needs_none_also_where_a_model_adds_inertia_to_that():
+    text = edited("mass = 2.0", "mass = 0")
+    for model in ("none", "plate"):
+        found = loads(text, "x", ["aero.bodies=['link2']", f"aero.model={model}"])
+        assert found.bodies[0].mass == 0.0
+
+
 def test_a_rod_may_have_no_inertia_about_itself_if_something_holds_it():
     rod = edited("inertia = 0.1", "inertia = [0, 0.1, 0.1, 0, 0, 0]", SMALL)
     with pytest.raises(ScenarioError) as error:

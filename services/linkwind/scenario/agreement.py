@@ -225,13 +225,14 @@ def _first(names: Sequence[str]) -> str:
 def _masses(scenario: Scenario) -> Iterator[Problem]:
     """A body moves only if it, a model or what hangs on it has inertia."""
     adding = [entry for entry in scenario.providers if entry.model in ADDING_INERTIA]
-    given = {name for entry in adding for name in entry.bodies}
     parents = {joint.child: joint.parent for joint in reversed(scenario.joints)}
+    carrying: set[str] = set()
     for body in scenario.bodies:  # what carries mass has it
         name = body.name if body.mass > 0.0 else "world"
-        while name != "world" and name not in given:
-            given.add(name)
+        while name != "world" and name not in carrying:
+            carrying.add(name)
             name = parents.get(name, "world")
+    given = carrying.union(*(entry.bodies for entry in adding))
     for index, body in enumerate(scenario.bodies):
         if body.name not in given:
             expected = "a number above 0 [kg], because no provider adds inertia to this body"
