@@ -38,6 +38,10 @@ def pages(tmp_path_factory):
     runs["far"] = dataclasses.replace(
         planar(400, name="far"), trajectory=runs["planar"].trajectory._replace(position=away)
     )
+    small = {"linear": 3e-4 * runs["planar"].trajectory.linear, "joint_gap": np.full(401, 6e-19)}
+    runs["wide"] = dataclasses.replace(
+        planar(400, name="wide"), trajectory=runs["planar"].trajectory._replace(**small)
+    )
     flow = survey("aero", lambda: wake(planar(400), every=50, rows=56, columns=64))
     runs["flow"] = dataclasses.replace(planar(400, name="flow"), flows=(flow,))
     for name, run in runs.items():
@@ -74,8 +78,13 @@ def picture(browser):
 
 
 def plot_box(browser, index=0):
-    box = f"document.querySelectorAll('.plot')[{index}].getBoundingClientRect()"
-    return browser.evaluate(f"(b => [b.left, b.top, b.width, b.height])({box})")
+    """Return left, top, width and height of the axes of a plot, in pixels of the page."""
+    return browser.evaluate(
+        f"""(plot => {{
+          const box = plot.getBoundingClientRect(), {{ l, t, w, h }} = plot._fullLayout._size;
+          return [box.left + l, box.top + t, w, h];
+        }})(document.querySelectorAll('.plot')[{index}])"""
+    )
 
 
 def test_the_time_moves_every_view(page):
@@ -100,6 +109,29 @@ def test_the_cursor_stands_where_the_plot_has_the_time(page):
         })()"""
     )
     assert abs(gap) < 1.5
+
+
+# Of each plot: the left edge of its axes and the gap from the title to the widest number, in pixels.
+GAPS = """[...document.querySelectorAll('.plot')].map(plot => {
+  const title = plot.querySelector('.ytitle').getBoundingClientRect();
+  const ticks = [...plot.querySelectorAll('.ytick text')].map(text => text.getBoundingClientRect());
+  const numbers = ticks.filter(box => box.width > 0).map(box => box.left);
+  const edge = plot.getBoundingClientRect().left;
+  return [plot._fullLayout._size.l, Math.min(...numbers) - title.right, title.left - edge];
+})"""
+
+
+def test_wide_numbers_stand_beside_the_title_of_their_axis(browser, pages):
+    browser.open(pages / "wide.html")
+    lefts, gaps, insides = zip(*browser.evaluate(GAPS), strict=True)
+    assert browser.evaluate("document.querySelector('.ytick:last-of-type text').textContent.length") >= 6
+    assert min(gaps) >= 0.0
+    assert min(insides) >= 0.0
+    assert len(set(lefts)) == 1
+    assert lefts[0] > 62
+    scrub(browser, 300)
+    cursors = browser.evaluate(CURSORS)
+    assert max(cursors) - min(cursors) < 0.5
 
 
 def test_the_readout_is_the_value_at_the_cursor(page):
@@ -134,21 +166,20 @@ def test_keys_step_frame_by_frame(page):
 
 def test_a_click_and_a_hover_on_a_plot_set_the_time(page):
     left, top, width, height = plot_box(page)
-    inner = width - 62 - 10
-    page.click(left + 62 + inner / 2, top + height / 2)
+    page.click(left + width / 2, top + height / 2)
     assert page.until(f"{T} > 0.1 && {T}") == pytest.approx(0.2, abs=0.002)
-    page.mouse("mouseMoved", left + 62 + inner / 4, top + height / 2)
+    page.mouse("mouseMoved", left + width / 4, top + height / 2)
     assert page.until(f"{T} < 0.15 && {T}") == pytest.approx(0.1, abs=0.002)
 
 
 def test_a_zoom_is_shared_by_all_plots(page):
     left, top, width, height = plot_box(page)
-    inner, y = width - 62 - 10, top + height / 2
-    page.mouse("mouseMoved", left + 62 + inner / 4, y)
-    page.mouse("mousePressed", left + 62 + inner / 4, y, 1)
+    y = top + height / 2
+    page.mouse("mouseMoved", left + width / 4, y)
+    page.mouse("mousePressed", left + width / 4, y, 1)
     for part in (0.4, 0.6, 0.75):
-        page.mouse("mouseMoved", left + 62 + inner * part, y, 1)
-    page.mouse("mouseReleased", left + 62 + inner * 0.75, y)
+        page.mouse("mouseMoved", left + width * part, y, 1)
+    page.mouse("mouseReleased", left + width * 0.75, y)
     timed = "[...document.querySelectorAll('.plot')].filter(plot => plot.querySelector('.cursor'))"
     ranges = f"{timed}.map(plot => plot.layout.xaxis.range)"
     page.until(f"{ranges}.every(r => r[0] > 0.05)")

@@ -2,7 +2,7 @@
 
 import { indexAt, unpack } from "./clock.js";
 
-const MARGIN = { l: 62, r: 10, t: 6, b: 8 };
+const MARGIN = { l: 62, r: 10, t: 6, b: 8 }; // on the left at least: all plots share the widest that one needs
 const BOTTOM = 36; // of a row that carries the time axis
 
 export function theme() {
@@ -42,14 +42,14 @@ function decades([low, high]) {
   return { tickvals: values, ticktext: values.map(String) };
 }
 
-function layoutOf(row, range, colour) {
+function layoutOf(row, range, left, colour) {
   const axis = {
     gridcolor: colour("grid"), zerolinecolor: colour("line"), linecolor: colour("line"), ticks: "outside",
     tickcolor: colour("line"), ticklen: 4, exponentformat: "power", automargin: false,
   };
   const bottom = row.last ? BOTTOM : MARGIN.b;
   return {
-    margin: { ...MARGIN, b: bottom }, showlegend: false, hovermode: false, bargap: 0.04,
+    margin: { ...MARGIN, l: left, b: bottom }, showlegend: false, hovermode: false, bargap: 0.04,
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
     font: { family: "system-ui, sans-serif", size: 12, color: colour("soft") },
     xaxis: {
@@ -58,7 +58,7 @@ function layoutOf(row, range, colour) {
       ...(row.bars ? decades(range) : {}),
     },
     yaxis: {
-      ...axis, title: { text: row.label, standoff: 4 }, type: row.log ? "log" : "linear", nticks: 5, zeroline: !row.log,
+      ...axis, automargin: "left", title: { text: row.label, standoff: 4 }, type: row.log ? "log" : "linear", nticks: 5, zeroline: !row.log,
       rangemode: row.bars ? "tozero" : "normal", tickformat: row.whole ? "d" : undefined,
       dtick: row.log ? undefined : row.whole ? 1 : undefined,
     },
@@ -130,7 +130,7 @@ export function makeCharts(panels, clock, host, zoomed = () => {}) {
   const config = {
     displaylogo: false, responsive: true, staticPlot: coarse, displayModeBar: false, doubleClick: false,
   };
-  let rows = [], timed = [], kind = null, range = whole();
+  let rows = [], timed = [], notes = [], kind = null, range = whole(), left = MARGIN.l;
 
   function whole() {
     const pad = clock.last > clock.first ? 0 : 0.5;
@@ -144,7 +144,7 @@ export function makeCharts(panels, clock, host, zoomed = () => {}) {
     for (const { plot, cursor } of timed) {
       const part = (t - range[0]) / (range[1] - range[0]);
       cursor.hidden = part < 0 || part > 1;
-      cursor.style.transform = `translateX(${MARGIN.l + part * (plot.clientWidth - MARGIN.l - MARGIN.r)}px)`;
+      cursor.style.transform = `translateX(${left + part * (plot.clientWidth - left - MARGIN.r)}px)`;
     }
   }
 
@@ -152,6 +152,7 @@ export function makeCharts(panels, clock, host, zoomed = () => {}) {
     if (to[0] === range[0] && to[1] === range[1]) return;
     range = to;
     for (const { plot } of timed) Plotly.relayout(plot, { "xaxis.range": [...range], "yaxis.autorange": true });
+    align();
     place(clock.t);
     const [low, high] = whole();
     zoomed(range, low === range[0] && high === range[1]);
@@ -161,7 +162,7 @@ export function makeCharts(panels, clock, host, zoomed = () => {}) {
     const { plot } = row;
     const timeOf = (event) => {
       const box = plot.getBoundingClientRect();
-      const part = (event.clientX - box.left - MARGIN.l) / (box.width - MARGIN.l - MARGIN.r);
+      const part = (event.clientX - box.left - left) / (box.width - left - MARGIN.r);
       return part < 0 || part > 1 ? null : range[0] + part * (range[1] - range[0]);
     };
     const move = (event) => { const t = timeOf(event); if (t !== null) clock.seek(t); };
@@ -179,18 +180,32 @@ export function makeCharts(panels, clock, host, zoomed = () => {}) {
     const colour = theme();
     for (const row of some) {
       row.stale = false;
-      Plotly.react(row.plot, tracesOf(row, colour), layoutOf(row, spanOf(row), colour), config);
+      Plotly.react(row.plot, tracesOf(row, colour), layoutOf(row, spanOf(row), left, colour), config);
     }
+    align();
+  }
+
+  // Gives every plot the left margin of the one with the widest numbers, so that their times stand in line.
+  function align() {
+    const drawn = rows.filter(({ plot }) => plot._fullLayout);
+    const widest = Math.ceil(Math.max(left, ...drawn.map(({ plot }) => plot._fullLayout._size.l)));
+    if (widest === left) return;
+    left = widest;
+    for (const { plot } of drawn) Plotly.relayout(plot, { "margin.l": left });
   }
 
   function build(panels) {
     for (const { plot } of rows) Plotly.purge(plot);
     host.replaceChildren();
+    left = MARGIN.l;
+    notes = [];
     rows = panels.flatMap((panel) => {
       const card = host.appendChild(document.createElement("article"));
       card.className = "card";
       card.appendChild(document.createElement("h2")).textContent = panel.title;
-      if (panel.note) card.appendChild(document.createElement("p")).textContent = panel.note;
+      const note = card.appendChild(document.createElement("p"));
+      note.hidden = !panel.note;
+      notes.push(note);
       return panel.rows.map((row) => makeRow(row, card));
     });
     timed = rows.filter((row) => !row.bars);
@@ -220,6 +235,7 @@ export function makeCharts(panels, clock, host, zoomed = () => {}) {
     }
     place(clock.t);
     for (const row of timed) row.show(clock.t);
+    panels.forEach((panel, i) => { notes[i].textContent = panel.note; });
   }
 
   show(panels, clock.series);
