@@ -26,6 +26,8 @@ from linkwind.scenario import from_json
 from linkwind.scenario.topology import carries
 from linkwind.spatial import Array
 
+ANGLE = 2  # which coordinate of a planar joint is one
+
 
 @dataclass(frozen=True)
 class Diagnostics:
@@ -60,6 +62,22 @@ class Coordinate(NamedTuple):
     turns: bool
     q: int
     v: int
+
+
+class Drive(NamedTuple):
+    """A force element that moves a joint: an actuator or a motion.
+
+    Attributes:
+        name: its name.
+        body: index of the body that the joint carries.
+        column: its place among the force elements.
+        turns: whether its effort is a torque [N·m]; else a force [N].
+    """
+
+    name: str
+    body: int
+    column: int
+    turns: bool
 
 
 @dataclass(frozen=True)
@@ -127,6 +145,23 @@ class Run:
     def closures(self) -> list[Mapping[str, Any]]:
         """The scenario's joints that close loops."""
         return [joint for joint, free in self._joints if not free]
+
+    @property
+    def drives(self) -> list[Drive]:
+        """The actuators and motions of the joints; none where the log says nothing of force elements."""
+        joints = {joint["name"]: joint for joint in self.scenario.get("joints", ())}
+        told, bodies = self.trajectory.force_effort.shape[1], self.bodies
+        return [
+            Drive(
+                force["name"],
+                bodies.index(joint["child"]),
+                i,
+                joint["type"] == "revolute" or (joint["type"] == "planar" and force["coordinate"] == ANGLE),
+            )
+            for i, force in enumerate(self.scenario.get("forces", ())[:told])
+            if force["type"] in ("actuator", "motion")
+            for joint in (joints[force["joint"]],)
+        ]
 
     @property
     def released(self) -> dict[str, float]:

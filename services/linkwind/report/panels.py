@@ -28,7 +28,7 @@ def points_per_curve(run: Run) -> int:
 
 def panels(run: Run) -> list[dict[str, Any]]:
     """Return the plots of a run in reading order; those that have nothing to show are left out."""
-    every = (_velocity, _aerodynamic, _coordinates, _joints, _coupling, _energy, _exchange)
+    every = (_velocity, _aerodynamic, _coordinates, _drives, _joints, _coupling, _energy, _exchange)
     made = (panel(run) for panel in every)
     return [panel for panel in made if panel is not None] + [_reported(run, each) for each in run.diagnostics]
 
@@ -124,6 +124,32 @@ def _coordinates(run: Run) -> dict[str, Any] | None:
         if rows
         else None
     )
+
+
+def _drives(run: Run) -> dict[str, Any] | None:
+    """Return effort and power of actuators and motions, and the mean power of each."""
+    drives, path = run.drives, run.trajectory
+    if not drives or not len(path.t):
+        return None
+    rows = [
+        _row(label, *(_curve(run, d.name, d.body, path.force_effort[:, d.column]) for d in some))
+        for turns, label in ((True, "torque [N·m]"), (False, "force [N]"))
+        if (some := [drive for drive in drives if drive.turns == turns])
+    ]
+    power = path.force_power[:, [d.column for d in drives]]
+    rows.append(_row("power [W]", *(_curve(run, d.name, d.body, power[:, i]) for i, d in enumerate(drives))))
+    return _panel("Drives", rows, f"What they give to the bodies. {_mean_powers(run, power)}")
+
+
+def _mean_powers(run: Run, power: Array) -> str:
+    """Return the mean power over the time that is shown [W], of each drive and of all; shape (k, drives)."""
+    t = run.trajectory.t
+    if len(t) < 2:
+        return ""
+    means = (np.diff(t) @ (power[1:] + power[:-1]) / 2.0 / (t[-1] - t[0])).tolist()
+    each = [f"{drive.name} {mean:.3g} W" for drive, mean in zip(run.drives, means, strict=True)]
+    total = f"; together {sum(means):.3g} W" if len(means) > 1 else ""
+    return f"Mean power from {t[0]:g} to {t[-1]:g} s: {', '.join(each)}{total}."
 
 
 def _joints(run: Run) -> dict[str, Any] | None:
