@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import logging
+import math
 
 import pytest
 
 from linkwind import aero
 from linkwind.aero.doubts import doubts
 from linkwind.errors import LinkwindError
+from linkwind.report.data import read
+from linkwind.report.gallery import gallery
 from linkwind.runs.run import run
 from linkwind.scenario import builtin_names, load
 
@@ -100,3 +103,27 @@ def test_angles_that_look_like_degrees(setting: str, told: str | None) -> None:
     found = list(doubts(load("two_link", [setting])))
     assert bool(found) == (told is not None)
     assert told is None or any(told in doubt for doubt in found)
+
+
+@pytest.mark.parametrize(("angle", "told"), [(30.0, True), (17.0, False)])
+def test_a_wing_far_beyond_what_the_wake_model_knows(angle: float, told: bool, tmp_path, caplog) -> None:
+    """The wing hardly moves in two steps: its angle of attack is that of the wind."""
+    wind = [7.5, 7.5 * math.tan(math.radians(angle)), 0.0]
+    changes = [
+        "bus.transport=inprocess",
+        "time.end=5e-3",
+        f"environment.wind={wind}",
+        "aero.vortex.spanwise=2",
+    ]
+    with caplog.at_level(logging.WARNING, "linkwind"):
+        done = run(load("flutter", changes), tmp_path / "out", report=False)
+    assert done.result.reported_max["aero"]["incidence_deg"] == pytest.approx(angle, abs=0.4)
+    notes = [note for note in (record.getMessage() for record in caplog.records) if "angle of attack" in note]
+    expected = (
+        "note: flutter.toml: aero.model: the largest angle of attack was 30°; from some 15° on a real flow "
+        "separates, which model vortex does not know."
+    )
+    assert notes == [expected] * told
+    caption = gallery(read(done.log))
+    assert f"Largest angle of attack: {angle:.0f}°." in caption
+    assert ("a real flow separates" in caption) == told

@@ -10,11 +10,11 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from linkwind.aero.base import Capabilities, ForceModel, item
-from linkwind.aero.doubts import doubts
+from linkwind.aero.doubts import doubts, doubts_after
 from linkwind.aero.field import ForceField
 from linkwind.aero.flow import Flow
 from linkwind.aero.none import Vacuum
@@ -93,4 +93,10 @@ def check(scenario: Scenario) -> None:
         if provider.model not in OWN:
             build(scenario, provider)
     for doubt in doubts(scenario):
+        _log.warning("note: %s", doubt)
+
+
+def check_after(scenario: Scenario, reported_max: Mapping[str, Mapping[str, float]]) -> None:
+    """Log what may be wrong with the forces of a run that is over; see :func:`doubts_after`."""
+    for doubt in doubts_after(scenario, reported_max):
         _log.warning("note: %s", doubt)

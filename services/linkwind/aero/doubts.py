@@ -1,13 +1,14 @@
-"""What is not wrong in a scenario, but perhaps not what was meant."""
+"""What is not wrong in a scenario or in a run, but perhaps not what was meant."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from linkwind.aero.base import body_indices, item
 from linkwind.aero.flow import grid as grids
 from linkwind.scenario import Provider, Scenario
+from linkwind.scenario.providers import BEYOND_DEG, SEPARATES_DEG
 
 WITHOUT_WIND = ("none", "field")  # models that read no wind from the scenario
 # Without the response a body wants so many times the mass of fluid that it accelerates, by the number of
@@ -29,6 +30,22 @@ def doubts(scenario: Scenario) -> Iterator[str]:
             yield from _too_light(scenario, provider)
         if provider.model == "vortex":
             yield from _of_rings(scenario, provider)
+
+
+def doubts_after(scenario: Scenario, reported_max: Mapping[str, Mapping[str, float]]) -> Iterator[str]:
+    """Yield what to tell the user after a run, a sentence each.
+
+    Args:
+        scenario: of the run.
+        reported_max: the largest of each of a provider's own numbers, by provider and name.
+    """
+    for provider in scenario.providers:
+        angle = reported_max.get(provider.name, {}).get("incidence_deg", 0.0)
+        if provider.model == "vortex" and angle > BEYOND_DEG:
+            yield (
+                f"{item(scenario, provider, 'model')}: the largest angle of attack was {angle:.0f}°; from "
+                f"some {SEPARATES_DEG:g}° on a real flow separates, which model vortex does not know."
+            )
 
 
 def _no_wind(scenario: Scenario) -> Iterator[str]:

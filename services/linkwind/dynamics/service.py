@@ -39,6 +39,8 @@ class Result:
         force_max_N: largest aerodynamic force on a body [N].
         events: when each event happened [s]; None: it did not.
         returns: of providers that were lost and came back.
+        reported_max: the largest of each of a provider's own numbers, by provider and name; NaN if it never
+            was one.
         final_state_sha256: of the last accepted poses and twists, little-endian float64, body by body.
     """
 
@@ -50,6 +52,7 @@ class Result:
     force_max_N: float  # noqa: N815  the unit's symbol
     events: dict[str, float | None]
     returns: tuple[Return, ...]
+    reported_max: dict[str, dict[str, float]]
     final_state_sha256: str
 
 
@@ -150,6 +153,10 @@ class DynamicsService:
             force_max_N=recorder.force_max,
             events=self._happened(final),
             returns=tuple(self._exchanges.recovery.returns),
+            reported_max={
+                p.name: dict(zip(p.diagnostics, p.largest.tolist(), strict=True))
+                for p in self.session.participants.values()
+            },
             final_state_sha256=digest(self.session.motion.accepted),
         )
 

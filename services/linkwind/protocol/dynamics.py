@@ -116,6 +116,9 @@ class DynamicsSession(HandShake):
             )
         known.answered = True
         known.payload = payload
+        reported = known.answer.diagnostics
+        if reported is not None:
+            np.fmax(known.largest, reported, out=known.largest)
         if known.past is not None:
             known.past.add(at[0], self._posted, payload)
         self._waiting -= 1

@@ -6,12 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from linkwind.errors import LinkwindError, LostError, MismatchError, RefusedError
 from linkwind.messages import KINDS, WrenchMessage
 from linkwind.protocol.control import PROGRAM, Control, fault_error, parse, refuse
 from linkwind.protocol.past import Past
 from linkwind.schema import SHA256
-from linkwind.spatial import Wrench
+from linkwind.spatial import Array, Wrench
 
 
 @dataclass
@@ -28,6 +30,7 @@ class Participant:
     payload: bytes = b""
     message: WrenchMessage | None = None
     diagnostics: tuple[str, ...] = ()
+    largest: Array = field(default_factory=lambda: np.empty(0))  # of these numbers so far, NaN for none
     kind: str = "point"
     rollback: bool = False
     frames: int = 0  # taken so far
@@ -244,6 +247,7 @@ class HandShake:
         else:
             known.kind, known.rollback, known.message = kind, ready.rollback, message
             known.diagnostics = tuple(ready.diagnostics)
+            known.largest = np.full(len(known.diagnostics), np.nan)
         if not known.rollback:
             known.past = None
         known.ready = True

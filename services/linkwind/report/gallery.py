@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
+from typing import Any
 
-from linkwind.report.data import Run
+from linkwind.report.data import Run, largest
 from linkwind.report.flow import Flow
 from linkwind.report.tables import number
 from linkwind.report.wake import Wake
+from linkwind.scenario.providers import BEYOND_DEG, SEPARATES_DEG
 
 CELL_REYNOLDS = "cell_reynolds"  # a diagnostic of the flow: of a cell and the fastest of wind and bodies
+INCIDENCE = "incidence_deg"  # of vortex: the largest angle of attack
 SPATIAL = 1000  # Reynolds number from which the wake of a bluff body is far from two-dimensional
 
 
@@ -35,14 +38,31 @@ def _limits(run: Run, flow: Flow) -> str:
     return said + spatial * (reynolds >= SPATIAL)
 
 
+def _attached(run: Run, provider: str) -> str:
+    """Return the largest angle of attack, and what vortex rings do not know from some on."""
+    angle = _reported(run, provider, "vortex", INCIDENCE)
+    if angle is None:
+        return ""
+    beyond = f" From some {SEPARATES_DEG:g}° on a real flow separates, which the model does not know."
+    return f" Largest angle of attack: {angle:.0f}°.{beyond * (angle > BEYOND_DEG)}"
+
+
 def _reynolds(run: Run, provider: str) -> float | None:
     """Return the largest Reynolds number that a model "flow" reports, None for another one."""
-    settings = next(each for each in run.scenario["providers"] if each["name"] == provider)
+    of_a_cell = _reported(run, provider, "flow", CELL_REYNOLDS)
+    return None if of_a_cell is None else of_a_cell * float(_settings(run, provider)["flow"]["cells"])
+
+
+def _reported(run: Run, provider: str, model: str, name: str) -> float | None:
+    """Return the largest of one of a provider's own numbers; None if it is of another model, or has none."""
     numbers = next((each for each in run.diagnostics if each.provider == provider), None)
-    if settings["model"] != "flow" or numbers is None or CELL_REYNOLDS not in numbers.names:
+    if _settings(run, provider)["model"] != model or numbers is None or name not in numbers.names:
         return None
-    of_a_cell = numbers.values[:, numbers.names.index(CELL_REYNOLDS)]
-    return float(of_a_cell.max()) * float(settings["flow"]["cells"])
+    return largest(numbers.values[:, numbers.names.index(name)])
+
+
+def _settings(run: Run, provider: str) -> Mapping[str, Any]:
+    return next(each for each in run.scenario["providers"] if each["name"] == provider)
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -82,13 +102,14 @@ def _wake(run: Run, wake: Wake) -> str:
         return ""
     data, width, height, times = drawn
     when, provider = ", ".join(f"{t:.3f}" for t in times), wake.provider
-    settings = next(each for each in run.scenario["providers"] if each["name"] == provider)
+    settings = _settings(run, provider)
     kept = ""
     if settings["model"] == "vortex":
         rows, step = settings["vortex"]["wake"], float(run.scenario["coupling"]["step"])
         kept = f"A wake holds the last {rows} rows, {number(rows * step)} s. "
     wings = _listed(settings["bodies"]) if len(settings["bodies"]) < 4 else f"{len(settings['bodies'])} wings"
     scale = f"±{number(wake.circulation)} m²/s"
+    kept += f"The log holds {len(wake.t)} frames.{_attached(run, provider)}"
     alternative = (
         f"Surfaces of vortex rings behind {wings} at t = {when} s, coloured by circulation, {scale}."
     )
@@ -96,7 +117,7 @@ def _wake(run: Run, wake: Wake) -> str:
         f"Wakes that {wings} shed, at t = {when} s, in perspective from one side, on one scale. Each cell is "
         "a vortex ring that goes with the fluid; its colour is its circulation, which it keeps: red and blue "
         "turn opposite ways, and where it changes from cell to cell there is vorticity. Dark cells are the "
-        f"rings on the wings. {kept}The log holds {len(wake.t)} frames."
+        f"rings on the wings. {kept}"
     )
     return _figure("Wakes", data, width, height, alternative, caption)
 

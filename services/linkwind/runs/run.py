@@ -264,6 +264,7 @@ def drive(
         return _new_log(path, service, beginning.metadata)
 
     kept = keep(folder, link, new_log, job, report=report)
+    aero.check_after(service.scenario, kept.result.reported_max)
     return Outcome(
         service.scenario.name, kept.result, kept.log, kept.report, kept.report_trouble, kept.log_trouble
     )

@@ -130,6 +130,11 @@ class FlowModel(Section):
     )
 
 
+# Angles of attack [deg]: from about the first on a real flow separates from a thin wing; beyond the second
+# the forces of the model vortex are those of no real flow, and the user is told.
+SEPARATES_DEG, BEYOND_DEG = 15.0, 20.0
+
+
 class VortexModel(Section):
     """Settings of the flow around thin wings in three dimensions: vortex rings, and wakes of them."""
 
