@@ -95,7 +95,7 @@ def test_a_table_has_the_columns_that_are_exported(tmp_path: Path, monkeypatch: 
             assert [repr(value) for value in columns[name].tolist()] == list(cells), name
     path = log.trajectory()
     assert linkwind.table(log)["link2.position.y [m]"].tolist() == path.position[:, 1, 1].tolist()
-    assert linkwind.table(log)["hinge.q"].tolist() == path.q[:, 3].tolist()
+    assert linkwind.table(log)["hinge.q [rad]"].tolist() == path.q[:, 3].tolist()
     with pytest.raises(linkwind.LinkwindError, match="trajectory, steps, wrench_aero; got wrench_areo"):
         linkwind.table(log, "wrench_areo")
 

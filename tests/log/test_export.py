@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from linkwind.log import export
 from linkwind.log.reader import open_log
 from linkwind.log.vtk import export_vtk
 from linkwind.mechanism import build
-from linkwind.mechanism.labels import labels
+from linkwind.mechanism.labels import labels, units
 from linkwind.runs.run import run
 from linkwind.scenario import builtin_names, load
 from tests.log.sample import NAMES, new_writer, record
@@ -115,9 +116,61 @@ def test_coordinates_and_forces_have_the_names_of_the_scenario(tmp_path):
     assert done.exit_code == 0, done.output
     found = read(tmp_path / "t" / "trajectory.csv")
     t = found["t [s]"]
-    np.testing.assert_allclose(found["right_shoulder.q"], -0.6 * np.sin(12.0 * np.pi * t), atol=1e-12)
-    np.testing.assert_allclose(found["left_shoulder.v"], 7.2 * np.pi * np.cos(12.0 * np.pi * t), atol=1e-9)
-    assert {"left_beat.force_effort", "right_beat.force_power", "world-body.q.6"} < set(found)
+    np.testing.assert_allclose(found["right_shoulder.q [rad]"], -0.6 * np.sin(12.0 * np.pi * t), atol=1e-12)
+    np.testing.assert_allclose(
+        found["left_shoulder.v [rad/s]"], 7.2 * np.pi * np.cos(12.0 * np.pi * t), atol=1e-9
+    )
+    assert {"left_beat.force_effort [N m]", "right_beat.force_power [W]", "world-body.q.6"} < set(found)
+    assert {"world-body.q.2 [m]", "world-body.v.2 [m/s]", "world-body.v.5 [rad/s]"} < set(found)
+
+
+def titles(scenario):
+    mechanism = build(scenario)
+    known = units(mechanism)
+    return {
+        field: [f"{name} [{unit}]" if unit else name for name, unit in zip(names, known[field], strict=True)]
+        for field, names in labels(mechanism).items()
+    }
+
+
+def test_the_unit_is_that_of_the_kind_of_joint_and_element():
+    """A slider and a wheel, both driven; of what may be released the coordinates have no one unit."""
+    assert titles(load(str(Path(__file__).parents[1] / "report" / "rig.toml"))) == {
+        "q": ["rail.q [m]", "axle.q [rad]"],
+        "v": ["rail.v [m/s]", "axle.v [rad/s]"],
+        "event_time": [],
+        "force_effort": ["line.force_effort [N]", "pull.force_effort [N]", "turn.force_effort [N m]"],
+        "force_power": ["line.force_power [W]", "pull.force_power [W]", "turn.force_power [W]"],
+    }
+    planar = titles(load("two_link"))["v"]
+    assert planar == [*(f"world-link1.v.{i} [{u}]" for i, u in enumerate(("m/s", "m/s", "rad/s"))),
+                      "hinge.v [rad/s]"]  # fmt: skip
+    found = titles(load("stage_separation"))
+    assert {"interstage.q.0", "interstage.v.0"} < {*found["q"], *found["v"]}
+    assert found["event_time"] == ["separation.event_time [s]"]
+
+
+def test_the_trajectory_has_the_numbers_that_came_with_the_last_answer_of_a_step(tmp_path, monkeypatch):
+    """Several answers a step: held against the messages, one by one."""
+    changes = ["time.end=0.01", "bus.transport=inprocess", "coupling.scheme=implicit", "aero.model=vortex"]
+    changes += ["aero.vortex.chordwise=2", "aero.vortex.spanwise=2"]
+    log = open_log(run(load("flapper", changes), tmp_path / "run", report=False).log)
+    last = {message.step: list(message.diagnostics) for _, _, message in log.decoded("/wrench/aero")}
+    assert log.topics["/wrench/aero"] > log.topics["/state"] == len(last)
+    monkeypatch.setattr(export, "BLOCK", 4)
+    found = export.table(log, "trajectory")
+    names = ("incidence_deg", "advance", "wake_rows")
+    rows = zip(found["step"].tolist(), *(found[f"aero.{name}"].tolist() for name in names), strict=True)
+    assert {step: numbers for step, *numbers in rows} == last
+    answers = list(export.table(log, "wrench_aero"))
+    assert answers.index("wake_rows") < answers.index("response.0")
+    assert answers[-1] == f"response.{18 * 18 - 1}"  # of two wings and a tail
+
+
+def test_where_no_answer_came_there_is_no_number():
+    reported = export.Reported(["aero.a"], np.array([3, 3, 5], "u8"), np.array([[1.0], [2.0], [4.0]]))
+    (column,) = reported.at(np.array([2, 3, 4, 5, 6], "u8"))
+    np.testing.assert_array_equal(column, [np.nan, 2.0, np.nan, 4.0, np.nan])
 
 
 @pytest.mark.parametrize("name", builtin_names())

@@ -47,7 +47,7 @@ def test_the_kite_climbs_to_where_line_weight_and_wind_agree(tmp_path: Path) -> 
     angle = -2.0 * math.atan2(end["sail.orientation.z"], end["sail.orientation.w"])
     press = 1.225 * 8.0**2 * math.sin(angle)
     pull = press * math.sin(angle), press * math.cos(angle) - 0.4 * 9.81
-    assert math.isclose(math.hypot(*pull), end["line.force_effort"], rel_tol=0.01)
+    assert math.isclose(math.hypot(*pull), end["line.force_effort [N]"], rel_tol=0.01)
     s, c = math.sin(angle), math.cos(angle)
     knot = end["sail.position.x [m]"] - 0.23 * c - 0.4 * s, end["sail.position.y [m]"] + 0.23 * s - 0.4 * c
     line_angle = math.atan2(knot[1], knot[0])

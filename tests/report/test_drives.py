@@ -17,62 +17,12 @@ from linkwind.scenario import load
 
 from .test_page import unpack
 
-# A slider on a rail that is pulled with 4 N, and a wheel that is turned at 3 rad/s against 0.5 N·m·s/rad.
-RIG = """
-[time]
-end = 2.0
-[environment]
-gravity = [0.0, 0.0, 0.0]
-[[bodies]]
-name = "slider"
-mass = 2.0
-inertia = 1.0
-[[bodies]]
-name = "wheel"
-mass = 1.0
-inertia = 1.0
-[[joints]]
-name = "rail"
-type = "prismatic"
-axis = [1.0, 0.0, 0.0]
-parent = "world"
-child = "slider"
-[[joints]]
-name = "axle"
-type = "revolute"
-parent = "world"
-child = "wheel"
-damping = 0.5
-[[forces]]
-name = "line"
-type = "spring"
-parent = "world"
-child = "slider"
-parent_point = [0.0, 1.0, 0.0]
-[[forces]]
-name = "pull"
-type = "actuator"
-joint = "rail"
-force = "4"
-[[forces]]
-name = "turn"
-type = "motion"
-joint = "axle"
-position = "3 * t"
-[aero]
-model = "none"
-[coupling]
-step = 1e-3
-[bus]
-transport = "inprocess"
-"""
+RIG = Path(__file__).with_name("rig.toml")
 
 
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    folder: Path = tmp_path_factory.mktemp("drives")
-    (folder / "rig.toml").write_text(RIG)
-    return read(run(load(str(folder / "rig.toml")), folder / "out", report=False).log)
+    return read(run(load(str(RIG)), tmp_path_factory.mktemp("drives") / "out", report=False).log)
 
 
 def drives(shown: Run) -> dict:

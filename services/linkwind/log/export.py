@@ -15,6 +15,7 @@ from linkwind.errors import InputError, LogError
 from linkwind.log import contents, tables
 from linkwind.log.difference import WIDTHS
 from linkwind.log.reader import Log
+from linkwind.spatial import Array
 
 Names = Mapping[str, Sequence[str]]
 """What the numbers of a field are called, by field, where they belong to no body."""
@@ -43,6 +44,26 @@ class Block(NamedTuple):
 
     head: list[str]
     columns: list[NDArray[Any]]
+
+
+class Reported(NamedTuple):
+    """A provider's own numbers.
+
+    Attributes:
+        head: titles of their columns.
+        step: of each answer, ascending, shape (answers,).
+        values: shape (answers, numbers).
+    """
+
+    head: list[str]
+    step: NDArray[np.uint64]
+    values: Array
+
+    def at(self, step: NDArray[np.uint64]) -> list[Array]:
+        """Return the numbers of the last answer at each of some steps as columns; NaN where there is none."""
+        place = np.searchsorted(self.step, step, side="right") - 1  # -1 before the first: another step's
+        there = self.step[place] == step
+        return list(np.where(there[:, None], self.values[place], np.nan).T)
 
 
 def export_csv(log: Log, folder: Path, names: Names | None = None) -> list[Path]:
@@ -146,7 +167,17 @@ def _topics(log: Log) -> dict[str, str]:
 
 
 def _blocks(log: Log, topic: str, names: Names) -> Iterator[Block]:
-    """Yield the messages of a topic, so many at a time."""
+    """Yield the messages of a topic, so many at a time; states with what the providers reported there."""
+    reported = list(_reported(log)) if topic == contents.STATE else []
+    for step, (head, columns) in _messages(log, topic, names):
+        for each in reported:
+            head += each.head
+            columns += each.at(step)
+        yield Block(head, columns)
+
+
+def _messages(log: Log, topic: str, names: Names) -> Iterator[tuple[NDArray[np.uint64], Block]]:
+    """Yield the messages of a topic, so many at a time, and their steps, shape (messages,)."""
     name = str(contents.message_name(topic))
     provider = topic.removeprefix(contents.WRENCH)
     bodies, numbers = log.provider_bodies.get(provider, log.bodies), log.diagnostics.get(provider, ())
@@ -154,12 +185,29 @@ def _blocks(log: Log, topic: str, names: Names) -> Iterator[Block]:
     while block := list(islice(payloads, BLOCK)):
         columns = tables.columns(block, name, f"{log.path}: {topic}")
         t = tables.seconds(columns.pop("time_ns"))
+        if "response" in columns:  # many columns, which few look for: behind the others
+            columns["response"] = columns.pop("response")
         known = dict(names) | {"diagnostics": numbers}
         labels = (_labels(field, values, bodies, known) for field, values in columns.items())
         head = [label for field in labels for label in field]
         step, *others = columns.values()
         values = [column for field in (step, t, *others) for column in field.T]
-        yield Block([head[0], "t [s]", *head[1:]], values)
+        yield step[:, 0], Block([head[0], "t [s]", *head[1:]], values)
+
+
+def _reported(log: Log) -> Iterator[Reported]:
+    """Yield the numbers of each provider that reported any."""
+    for provider, names in log.diagnostics.items():
+        topic = contents.WRENCH + provider
+        payloads = (message.payload for message in log.raw(topic))
+        steps, values = [], []
+        while block := list(islice(payloads, BLOCK)):
+            columns = tables.columns(block, "WrenchStep", f"{log.path}: {topic}")
+            steps.append(columns["step"][:, 0])
+            values.append(columns["diagnostics"])
+        if steps and values[0].shape[1] == len(names):
+            head = [f"{provider}.{name}" for name in names]
+            yield Reported(head, np.concatenate(steps), np.concatenate(values))
 
 
 def _labels(field: str, values: NDArray[Any], bodies: Sequence[str], names: Names) -> Iterator[str]:

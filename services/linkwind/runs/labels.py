@@ -6,12 +6,20 @@ from linkwind.errors import InputError
 from linkwind.log.reader import Log
 from linkwind.log.scenarios import recorded
 from linkwind.mechanism import build
-from linkwind.mechanism.labels import labels
+from linkwind.mechanism.labels import labels, units
 
 
 def labels_of(log: Log) -> dict[str, tuple[str, ...]]:
-    """Return the names by field, as in :mod:`linkwind.mechanism.labels`; nothing if no scenario tells."""
+    """Return titles by field, names and units: ``hinge.q [rad]``; nothing if no scenario tells.
+
+    The names are those of :mod:`linkwind.mechanism.labels`.
+    """
     try:
-        return labels(build(recorded(log)))
+        mechanism = build(recorded(log))
     except InputError:
         return {}
+    known = units(mechanism)
+    return {
+        field: tuple(f"{n} [{u}]" if u else n for n, u in zip(names, known[field], strict=True))
+        for field, names in labels(mechanism).items()
+    }
