@@ -41,7 +41,7 @@ def test_effort_and_power_of_an_actuator_and_a_motion(rig: Run) -> None:
     np.testing.assert_allclose(unpack(rows["torque [N·m]"]["turn"]["y"]), 0.5 * 3.0)
     pull, turn = (rows["power [W]"][name] for name in ("pull", "turn"))
     np.testing.assert_allclose(unpack(turn["y"]), 0.5 * 3.0**2)
-    np.testing.assert_allclose(unpack(pull["y"]), 4.0 * 4.0 / 2.0 * unpack(pull["x"]), rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(unpack(pull["y"]), 8.0 * rig.trajectory.t, rtol=1e-6, atol=1e-9)
     assert (pull["colour"], turn["colour"]) == (0, 1)  # of the bodies that they move
     # 4² / 2 · 2 s / 2 = 8 W in the mean, and 4.5 W.
     assert "Mean power from 0 to 2 s: pull 8 W, turn 4.5 W; together 12.5 W." in drives(rig)["note"]

@@ -285,6 +285,24 @@ def test_a_long_run_is_thinned_but_keeps_its_peaks(run):
             assert (x[0], x[-1]) == (long.trajectory.t[0], long.trajectory.t[-1])
             assert np.array_equal(y, all_of_it[np.round(x * 1e3).astype(int)])
     assert f"The run has {len(long.trajectory.t)} states" in page.texts["body"]
+    assert f"a curve at most {POINTS} points" in page.texts["body"]
+    assert not unpack(page.data["t"]).size  # no curve needs them
+
+
+def test_times_are_in_the_page_once_while_curves_are_whole(run):
+    """2,402 states: more than a thinned curve has, but whole they take fewer bytes."""
+    page = Page(render(repeated(run, 2)))
+    curves = [
+        c
+        for panel in page.data["panels"]
+        for row in panel["rows"]
+        if not row.get("bars")
+        for c in row["curves"]
+    ]
+    assert {unpack(curve["y"]).size for curve in curves} == {2402} == {unpack(page.data["t"]).size}
+    assert not any("x" in curve for curve in curves)
+    assert "The animation shows at most" in page.texts["body"]
+    assert "a curve at most" not in page.texts["body"]
 
 
 def test_curves_of_a_step_of_ten_microseconds_keep_their_times(run):

@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 
 from linkwind.report.data import Run, largest
-from linkwind.report.panels import points_per_curve, prefixed
+from linkwind.report.panels import points_per_curve, prefixed, shown_whole
 from linkwind.report.scene import FRAMES
 from linkwind.report.tables import number
 
@@ -79,12 +79,13 @@ def note(run: Run) -> str:
     if not states:
         return "The log holds no state of the mechanism: there is nothing to draw."
     between = "Between two frames of the wakes their lines go straight. " if run.wakes else ""
-    if states <= min(FRAMES, points):
+    whole = shown_whole(run)
+    if states <= min(FRAMES, whole):
         return f"All {states} states are shown. {between}{_ZOOM}"
+    thinned = f"; a curve at most {points} points, the smallest and the largest of each interval"
     return (
-        f"The run has {states} states. The animation shows at most {FRAMES} of them, evenly spread; a curve "
-        f"at most {points} points, the smallest and the largest of each interval. The log holds all. "
-        f"{between}{_ZOOM}"
+        f"The run has {states} states. The animation shows at most {FRAMES} of them, evenly spread"
+        f"{thinned * (states > whole)}. The log holds all. {between}{_ZOOM}"
     )
 
 

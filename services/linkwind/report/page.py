@@ -9,6 +9,7 @@ from importlib.resources import files
 from string import Template
 from typing import Any
 
+import numpy as np
 from plotly.offline import get_plotlyjs
 
 from linkwind.report.arrays import pack
@@ -64,10 +65,12 @@ def _data(run: Run) -> dict[str, Any]:
     moving = scene(run)
     if moving is None:
         return {"scene": None}
+    plots = panels(run)
+    shared = any("x" not in curve for panel in plots for row in panel["rows"] for curve in row["curves"])
     return {
         "scene": moving,
-        "t": pack(run.trajectory.t, "f8"),
-        "panels": panels(run),
+        "t": pack(run.trajectory.t if shared else np.empty(0), "f8"),
+        "panels": plots,
         "flow": _film(run) if moving["planar"] else None,
         "wake": _wake(run),
     }

@@ -12,7 +12,8 @@ from linkwind.report.arrays import pack, peaks
 from linkwind.report.data import Diagnostics, Run, largest
 from linkwind.spatial import Array
 
-POINTS = 2000  # of a curve
+POINTS = 2000  # of a curve that is thinned
+WHOLE = 1.5  # times as many samples are shown all: that costs half of as many points with times of their own
 ROUND_OFF = 1e-12  # of a vector's usual size: a component that is always below is drawn as zero
 MANY_BODIES = 8  # more of them share the points of this many
 
@@ -22,8 +23,13 @@ _TURN_AXES = {True: (2,), False: (0, 1, 2)}
 
 
 def points_per_curve(run: Run) -> int:
-    """Return the most points that a curve of this run gets on the page."""
+    """Return the most points that a curve of this run gets on the page if it is thinned."""
     return POINTS * MANY_BODIES // max(MANY_BODIES, len(run.bodies))
+
+
+def shown_whole(run: Run) -> int:
+    """Return up to how many samples a curve of this run is shown whole."""
+    return int(WHOLE * points_per_curve(run))
 
 
 def panels(run: Run) -> list[dict[str, Any]]:
@@ -51,9 +57,9 @@ def _row(label: str, *curves: dict[str, Any], **how: bool | str) -> dict[str, An
 
 def _curve(run: Run, name: str, colour: int, y: Array, t: Array | None = None) -> dict[str, Any]:
     """Return one curve; ``x`` is left out where it is the trajectory's own times, not thinned."""
-    keep = peaks(y, points_per_curve(run))
-    shared = t is None and keep.size == y.size
+    keep = np.arange(y.size) if y.size <= shown_whole(run) else peaks(y, points_per_curve(run))
     times = run.trajectory.t if t is None else t
+    shared = keep.size == y.size and np.array_equal(times, run.trajectory.t)
     return {"name": name, "colour": colour, "y": pack(y[keep])} | (
         {} if shared else {"x": pack(times[keep], "f8")}
     )
