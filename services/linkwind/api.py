@@ -177,7 +177,8 @@ def table(log: Log | str | Path, name: str = "trajectory") -> dict[str, NDArray[
             answers of a provider.
 
     Returns:
-        columns such as ``t [s]``, ``link1.position.x [m]``, ``hinge.q``, each of shape (rows,).
+        columns such as ``t [s]``, ``link1.position.x [m]``, ``hinge.q [rad]``, and the providers' own
+        numbers, ``aero.incidence_deg``; each of shape (rows,).
 
     Raises:
         LogError: there is no such log or table.
