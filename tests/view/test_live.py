@@ -161,6 +161,27 @@ def test_what_is_no_command_is_refused(command):
         console.steer(command)
 
 
+def test_the_mean_power_of_the_drives_is_of_the_time_that_is_shown(browser, tmp_path):
+    """It is told anew as the log grows: the power of a beat is not the same all the time."""
+    done = run(load("flapper", [*HERE, "time.end=0.3"]), tmp_path / "run", report=False)
+    data, path = done.log.read_bytes(), tmp_path / "log.mcap"
+    part = 2 * len(data) // 3
+    path.write_bytes(data[:part])
+    texts = "[...document.querySelectorAll('.card p')].map(p => p.textContent)"
+    note = f"{texts}.find(text => text.includes('Mean power'))"
+    with served(path) as url:
+        show(browser, url)
+        first = browser.until(note)
+        with path.open("ab") as file:
+            file.write(data[part:])
+        browser.until(f"{note}.includes('from 0 to 0.3 s')")
+    power = open_log(path).trajectory().force_power
+    means = 0.5 * (power[1:] + power[:-1]).mean(axis=0)  # the steps are equal
+    assert "from 0 to 0.3 s" not in first
+    assert f"together {sum(means):.3g} W." in browser.evaluate(note)
+    assert troubles(browser) == []
+
+
 def test_a_log_that_grows_is_followed_to_its_end(browser, logs, tmp_path):
     data, path = logs["planar"].read_bytes(), tmp_path / "log.mcap"
     part = 2 * len(data) // 3
