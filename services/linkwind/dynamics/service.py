@@ -25,6 +25,8 @@ from linkwind.protocol import Course, DynamicsSession
 from linkwind.scenario import Scenario
 from linkwind.spatial import Motion
 
+SILENT = 10_000  # steps at most between two words of progress
+
 
 @dataclass(frozen=True)
 class Result:
@@ -186,7 +188,7 @@ class DynamicsService:
                 f"{scenario.source}: coupling.scheme: implicit: expected providers that can go back to the "
                 f"start of a step; got {names}, which cannot. Use pec."
             )
-        stride, due = max(1, self._steps // 200), 0
+        stride, due = min(max(1, self._steps // 200), SILENT), 0
         state = self._plant.initial
         for point in scheme(self._plant, self._exchange, state, self._steps, settings):
             self._pending.append(point)  # written while the next answer is awaited

@@ -23,6 +23,7 @@ from linkwind.log.writer import LogWriter
 from linkwind.mechanism import Mechanism, build
 from linkwind.native.library import library_sha256
 from linkwind.runs import folder as folders
+from linkwind.runs import room
 from linkwind.runs.here import providers_here, zenoh_link
 from linkwind.runs.keeping import keep
 from linkwind.runs.successor import Successor
@@ -253,7 +254,8 @@ def drive(
         with _heard(writer, link, service, listened=listened) as heard:
             log = beginning.log(writer, heard)
             recorder = Recorder(log, service.scenario, service.mechanism, service.multibody)
-            result = service.run(beginning.link(link), recorder, progress, poll)
+            looking = room.looking(progress, writer.path, service.scenario.steps)
+            result = service.run(beginning.link(link), recorder, looking, poll)
             if successor is not None:
                 successor.replace(writer)
             writer.close(final_state_sha256=result.final_state_sha256)
