@@ -68,7 +68,7 @@ def test_environment_says_what_to_run(project: Project, tmp_path: Path) -> None:
         STEP="0.002",
         END="0.2",
         MODEL="plate",
-        SET="environment.wind=[-4,0,0] coupling.scheme=explicit",
+        SET="environment.wind=[-4, 0, 0]; coupling.scheme=explicit",
     )
     assert status == 0, output
     log = open_log(project.folder() / "log.mcap")
