@@ -19,22 +19,22 @@ def test_the_rest_of_the_run_is_set_against_what_is_free(
     free: float, told: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """1,000 bytes a step, 100,000 steps to come: 0.1 GB."""
-    log, seen = tmp_path / "log.mcap", []
+    log, seen = SimpleNamespace(path=tmp_path / "log.mcap", size=0), []
     monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=free))
     look = looking(seen.append, log, 100_000 + 2 * SAMPLE)
     with caplog.at_level(logging.WARNING, "linkwind"):
         for step in (SAMPLE, SAMPLE + 1, 2 * SAMPLE, 3 * SAMPLE):
-            log.write_bytes(bytes(7_000 + 1_000 * step))
+            log.size = 7_000 + 1_000 * step
             look(step)
     assert seen == [SAMPLE, SAMPLE + 1, 2 * SAMPLE, 3 * SAMPLE]
     assert [record.getMessage().split(". Is")[0] for record in caplog.records] == [
-        f"note: {log}: the log grows by 1000 B a step, so that the 100000 steps to come ask for 0.1 GB; "
+        f"note: {log.path}: the log grows by 1000 B a step, so that the 100000 steps to come ask for 0.1 GB; "
         "0.099 GB are free"
     ] * told
 
 
 def test_short_runs_are_not_looked_at(tmp_path: Path) -> None:
-    looking(lambda step: None, tmp_path / "none", 2 * SAMPLE)(SAMPLE + 1)
+    looking(lambda step: None, SimpleNamespace(path=tmp_path), 2 * SAMPLE)(SAMPLE + 1)  # without a size
 
 
 def test_a_run_tells(

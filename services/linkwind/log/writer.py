@@ -85,6 +85,11 @@ class LogWriter:
         self._closed = False
         self.flush()
 
+    @property
+    def size(self) -> int:
+        """Bytes that the file was given so far."""
+        return self._file.seek(0)
+
     def _open(self) -> None:
         try:
             self._file = Sink(self.path)

@@ -6,18 +6,28 @@ import logging
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Protocol
 
 _log = logging.getLogger("linkwind")
 
 SAMPLE = 5_000  # steps after which it is known how fast a log grows
 
 
-def looking(progress: Callable[[int], None], log: Path, steps: int) -> Callable[[int], None]:
+class Growing(Protocol):
+    """A log that is written: the file where it is now, and its size [B]."""
+
+    path: Path
+
+    @property
+    def size(self) -> int: ...
+
+
+def looking(progress: Callable[[int], None], log: Growing, steps: int) -> Callable[[int], None]:
     """Return a progress that also says, once, that the rest of the run will not fit on the disk.
 
     Args:
         progress: is told now and then how many steps are done.
-        log: the file that grows.
+        log: that grows.
         steps: of the whole run.
     """
     first: tuple[int, int] | None = None  # steps done and size of the file, when looked at first
@@ -28,12 +38,11 @@ def looking(progress: Callable[[int], None], log: Path, steps: int) -> Callable[
         progress(step)
         if looked or steps - step < SAMPLE:
             return
-        size = log.stat().st_size
         if first is None:
-            first = step, size
+            first = step, log.size
         elif step - first[0] >= SAMPLE:
             looked = True
-            _compare(log, (size - first[1]) / (step - first[0]), steps - step)
+            _compare(log.path, (log.size - first[1]) / (step - first[0]), steps - step)
 
     return look
 

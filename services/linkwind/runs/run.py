@@ -254,7 +254,7 @@ def drive(
         with _heard(writer, link, service, listened=listened) as heard:
             log = beginning.log(writer, heard)
             recorder = Recorder(log, service.scenario, service.mechanism, service.multibody)
-            looking = room.looking(progress, writer.path, service.scenario.steps)
+            looking = room.looking(progress, writer, service.scenario.steps)
             result = service.run(beginning.link(link), recorder, looking, poll)
             if successor is not None:
                 successor.replace(writer)
