@@ -1,6 +1,8 @@
 /* Wakes: what the trailing edges leave behind goes with the fluid. */
 #include "lw_wake.h"
 
+#include "lw_surface.h"
+
 /* Corner j of the r-th edge between rows of rings: 0 is the trailing edge. */
 static double *edge(const lw_vortex *v, int32_t surface, int32_t r, int32_t j) {
     const int32_t across = v->spanwise + 1;
