@@ -22,7 +22,9 @@ from tests.networks.namespaces import Machines
 
 PATIENCE = 120.0  # s for a machine under load
 RECOVERY = 60.0  # s
-LONG = (f"bus.recovery={RECOVERY:g}", "coupling.timeout=20", "time.end=10")  # 3 s of wall clock, 10,000 steps
+LONG = (f"bus.recovery={RECOVERY:g}", "coupling.timeout=20", "time.end=10")  # 10,000 steps
+STARTED = 100_000  # bytes of a log
+SIZE = 22_000_000  # bytes of the whole log of LONG
 
 
 def unharmed(
@@ -54,24 +56,25 @@ def child_of(run: subprocess.Popen[str]) -> int:
     return child
 
 
-def under_way(log: Path) -> None:
-    """Wait until a run has done some steps."""
+def under_way(log: Path, size: int = STARTED) -> None:
+    """Wait until a run has come so far that its log has ``size`` bytes."""
     deadline = time.monotonic() + PATIENCE
-    while not log.exists() or log.stat().st_size < 100_000:
+    while not log.exists() or log.stat().st_size < size:
         assert time.monotonic() < deadline, "the run did not get under way"
         time.sleep(0.005)
 
 
-def hit(
-    folder: Path, number: signal.Signals, after: float, scenario: str = "two_link", *settings: str
-) -> float:
-    """Send a signal to the provider that ``linkwind run`` has started; return how long it was away [s]."""
+def hit(folder: Path, number: signal.Signals, size: int, scenario: str = "two_link", *settings: str) -> float:
+    """Send a signal to the provider of a run whose log has come to ``size`` bytes.
+
+    Returns:
+        How long the provider was away [s].
+    """
     programs = Programs(folder)
     try:
         options = [f"--set={setting}" for setting in (*LONG, *settings)]
         run = programs.start("run", scenario, "--out", "out", "--json", *options)
-        under_way(programs.log())
-        time.sleep(after)
+        under_way(programs.log(), size)
         os.kill(child_of(run), number)
         returns = unharmed(run, programs.log())["returns"]
         assert returns
@@ -120,16 +123,19 @@ def cut(folder: Path, gone: float) -> float:
         machines.end()
 
 
+def some_time(chance: Random) -> int:
+    """Return a random moment of LONG as bytes of its log: by progress, as machines differ in speed."""
+    return int(chance.uniform(STARTED, 0.7 * SIZE))
+
+
 def killed(folder: Path, chance: Random) -> float:
     """Kill the provider at a random moment of two_link."""
-    return hit(folder, signal.SIGKILL, chance.uniform(0.0, 1.5))
+    return hit(folder, signal.SIGKILL, some_time(chance))
 
 
 def silent(folder: Path, chance: Random) -> float:
     """Let the provider say nothing more: stop it, and wait less for an answer than for a sign of life."""
-    return hit(
-        folder, signal.SIGSTOP, chance.uniform(0.0, 1.5), "two_link", f"coupling.timeout={LEASE / 2:g}"
-    )
+    return hit(folder, signal.SIGSTOP, some_time(chance), "two_link", f"coupling.timeout={LEASE / 2:g}")
 
 
 def cut_off(folder: Path, chance: Random) -> float:

@@ -211,7 +211,7 @@ def view(stage: Stage) -> Process:
 
 def verify(stage: Stage) -> Process:
     # Of a scheme whose steps cannot be taken many at a time: there has to be something left to stop.
-    process = stage.command("verify", stage.some_log("coupling.scheme=explicit", "time.end=60"))
+    process = stage.command("verify", stage.some_log("coupling.scheme=explicit", "time.end=80"))
     time.sleep(1.2)
     return process
 

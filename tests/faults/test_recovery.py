@@ -16,7 +16,7 @@ from linkwind.bus.zenoh import LEASE
 from linkwind.credentials.authority import DEFAULT_ROLES, issue
 from linkwind.runs.run import run
 from linkwind.scenario import load
-from tests.faults.recovered import LONG, child_of, cut, hit, hit_twice, killed, under_way, unharmed
+from tests.faults.recovered import LONG, SIZE, child_of, cut, hit, hit_twice, killed, under_way, unharmed
 from tests.faults.test_processes import Programs, finish
 from tests.networks.namespaces import reason
 
@@ -52,11 +52,11 @@ def test_one_that_comes_back_is_killed_on_the_way(after: float, tmp_path: Path) 
 
 def test_a_flow_comes_back(tmp_path: Path) -> None:
     settings = ("time.end=0.12", "aero.flow.cells=32", "coupling.step=3e-5", "log.checkpoint_every=300")
-    hit(tmp_path, signal.SIGKILL, 1.0, "two_link_flow", *settings)
+    hit(tmp_path, signal.SIGKILL, 40_000_000, "two_link_flow", *settings)
 
 
 def test_a_stopped_provider_is_ended_and_started_again(tmp_path: Path) -> None:
-    hit(tmp_path, signal.SIGSTOP, 0.5)
+    hit(tmp_path, signal.SIGSTOP, SIZE // 4)
 
 
 def test_over_tls(tmp_path: Path) -> None:
