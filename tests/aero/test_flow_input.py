@@ -52,7 +52,7 @@ def test_what_is_refused_before_the_start(changes, message):
         (["environment.wind=[1.0, 0.0, 0.5]"], "environment.wind: expected no component along z"),
         (["environment.density=0.0"], "environment.density: expected a number above 0 for the model flow"),
         (["bodies.0.inertia=[1.0, 1.0, 1.0, 0.0, 0.0, 0.0]"],
-         'bodies[0] "body".inertia: expected one number: the model flow is two-dimensional'),
+         'bodies[0] "body".inertia: expected one number: the flow is two-dimensional'),
     ],
 )  # fmt: skip
 def test_what_a_two_dimensional_flow_cannot_have(changes, message):

@@ -46,6 +46,11 @@ def test_boxes_and_cylinders_have_their_size(data, key, size):
     assert sides == pytest.approx(size)
 
 
+def test_an_ellipsoid_is_a_sphere_that_is_stretched():
+    size = drawn({"type": "ellipsoid", "size": [1.0, 2.0, 3.0]}, "spheres").size
+    assert (size.x, size.y, size.z) == (1.0, 2.0, 3.0)
+
+
 @pytest.mark.parametrize("outline", [DART, COMB, COMB[:7]])
 def test_triangles_fill_a_polygon(outline):
     """As many triangles as there must be, none turned over, their areas adding up to the polygon's."""

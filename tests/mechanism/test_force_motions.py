@@ -234,11 +234,17 @@ def test_a_buoyant_body_bobs_on_its_tether():
     assert abs(run.residual) < 1e-7
 
 
-def test_the_volume_is_that_of_the_shape_and_the_fluid_that_of_the_environment():
-    shape = {"type": "ellipse", "length": 0.4, "width": 0.1, "span": 2.0}
+@pytest.mark.parametrize(
+    ("shape", "expected"),
+    [
+        ({"type": "ellipse", "length": 0.4, "width": 0.1, "span": 2.0}, np.pi * 0.2 * 0.05 * 2.0),
+        ({"type": "ellipsoid", "size": [0.4, 0.1, 2.0]}, 4.0 / 3.0 * np.pi * 0.2 * 0.05 * 1.0),
+    ],
+)
+def test_the_volume_is_that_of_the_shape_and_the_fluid_that_of_the_environment(shape, expected):
     case = scenario([BALL | {"shape": shape}], [], [{"type": "buoyancy", "name": "b", "body": "ball"}])
     volume, density, _ = build(case).tables.force_number[0]
-    assert (volume, density) == (pytest.approx(np.pi * 0.2 * 0.05 * 2.0), 1.225)
+    assert (volume, density) == (pytest.approx(expected), 1.225)
 
 
 def test_a_force_at_a_point_is_a_force_and_its_moment():

@@ -43,6 +43,13 @@ def test_an_outline_has_the_points_that_were_asked_for(kind):
     assert made(kind).outline(10).shape == (10, 2)
 
 
+def test_an_ellipsoid_is_cut_by_the_plane():
+    shape = shape_of({"type": "ellipsoid", "size": [0.5, 0.2, 0.8]})
+    assert signed_area(shape.outline(2000)) == pytest.approx(np.pi * 0.25 * 0.1, rel=1e-5)
+    assert (shape.reference_length, shape.span) == (0.5, 0.8)
+    assert body('{ type = "ellipsoid", size = [0.5, 0.2, 0.8] }').shape == shape
+
+
 def test_rounded_corners_lie_at_their_radius():
     r, half = 0.06, np.array([0.25, 0.1])
     outline = made("rectangle", radius=r).outline(400)
@@ -74,9 +81,13 @@ def test_a_scenario_keeps_its_shape(kind):
 
 
 WRONG = [
-    ("{}", "type: expected one of plate, ellipse, rectangle, circle, polygon; got nothing. Add type."),
+    ("{}",
+     "type: expected one of plate, ellipse, rectangle, circle, polygon, ellipsoid; got nothing. Add type."),
     ('{ type = "ellips" }',
-     'type: expected one of plate, ellipse, rectangle, circle, polygon; got "ellips". Use "ellipse".'),
+     "type: expected one of plate, ellipse, rectangle, circle, polygon, ellipsoid; "
+     'got "ellips". Use "ellipse".'),
+    ('{ type = "ellipsoid", size = [0.1, 0.1] }',
+     "size: expected 3 numbers above 0; got [0.1, 0.1, 0.0]. Correct it."),
     ('{ type = "circle" }', "diameter: expected a value (Diameter [m]); got nothing. Add diameter."),
     ('{ type = "circle", diameter = "1" }',
      'diameter: expected a number [m]; got "1". Write the number alone, without quotes and unit.'),

@@ -1,4 +1,4 @@
-"""Solids for Foxglove: of a shape, a box, a cylinder or triangles over any outline; and pictures."""
+"""Solids for Foxglove: of a shape, a box, a cylinder, a ball or triangles over any outline; and pictures."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ from foxglove.messages import (
     Vector3,
 )
 
-from linkwind.scenario.pictures import Box, Capsule, Ellipsoid, Mesh, Pictures
-from linkwind.scenario.shapes import AnyShape, Circle, Ellipse, Plate, Rectangle
+from linkwind.scenario import pictures as drawings
+from linkwind.scenario.pictures import Box, Capsule, Mesh, Pictures
+from linkwind.scenario.shapes import AnyShape, Circle, Ellipse, Ellipsoid, Plate, Rectangle
 from linkwind.spatial import Array
 
 ORIGIN = Pose(position=Vector3(x=0.0, y=0.0, z=0.0), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0))
@@ -43,6 +44,8 @@ def solid(shape: AnyShape, thickness: float, color: Color) -> dict[str, Any]:
         size = Vector3(x=x, y=y, z=shape.span)
         cylinder = CylinderPrimitive(pose=ORIGIN, size=size, bottom_scale=1.0, top_scale=1.0, color=color)
         return {"cylinders": [cylinder]}
+    if isinstance(shape, Ellipsoid):
+        return {"spheres": [SpherePrimitive(pose=ORIGIN, size=_size(*shape.size), color=color)]}
     return {"triangles": [_prism(shape.outline(), shape.span, color)]}
 
 
@@ -53,7 +56,7 @@ def drawn(pictures: Pictures, color: Color) -> dict[str, list[Any]]:
         pose = _pose(picture.position, picture.orientation)
         if isinstance(picture, Box):
             found["cubes"].append(CubePrimitive(pose=pose, size=_size(*picture.size), color=color))
-        elif isinstance(picture, Ellipsoid):
+        elif isinstance(picture, drawings.Ellipsoid):
             found["spheres"].append(SpherePrimitive(pose=pose, size=_size(*picture.size), color=color))
         elif isinstance(picture, Mesh):
             scale = _size(*picture.scale)

@@ -17,8 +17,9 @@ from linkwind.mechanism import Mechanism, build
 from linkwind.mechanism.quaternion import matrix
 from linkwind.mechanism.remarks import Remark, comment
 from linkwind.native.tables import JOINT_TYPES
-from linkwind.scenario import Body, Circle, Plate, Rectangle, Scenario
-from linkwind.scenario.pictures import Box, Capsule, Cylinder, Ellipsoid, Mesh, Picture, Pictures
+from linkwind.scenario import Body, Circle, Ellipsoid, Plate, Rectangle, Scenario
+from linkwind.scenario import pictures as drawings
+from linkwind.scenario.pictures import Box, Capsule, Cylinder, Mesh, Picture, Pictures
 from linkwind.spatial import Array
 
 TYPES = {
@@ -136,6 +137,8 @@ def _drawn(body: Body) -> Iterator[tuple[ET.Element, Array, Array]]:
         return
     if isinstance(shape, Circle):
         yield _cylinder(shape.diameter, shape.span), np.zeros(3), np.eye(3)
+    elif isinstance(shape, Ellipsoid) and len(set(shape.size)) == 1:
+        yield ET.Element("sphere", radius=repr(0.5 * shape.span)), np.zeros(3), np.eye(3)
     elif isinstance(shape, Plate | Rectangle):
         width = shape.width if isinstance(shape, Rectangle) else 0.01 * shape.length
         yield ET.Element("box", size=_numbers([shape.length, width, shape.span])), np.zeros(3), np.eye(3)
@@ -154,7 +157,7 @@ def _geometry(picture: Picture) -> Iterator[tuple[ET.Element, float]]:
         yield ET.Element("box", size=_numbers(picture.size)), 0.0
     elif isinstance(picture, Mesh):
         yield ET.Element("mesh", filename=picture.file, scale=_numbers(picture.scale)), 0.0
-    elif isinstance(picture, Ellipsoid):
+    elif isinstance(picture, drawings.Ellipsoid):
         if len(set(picture.size)) == 1:
             yield ET.Element("sphere", radius=repr(picture.size[0] / 2)), 0.0
     elif isinstance(picture, Cylinder | Capsule):

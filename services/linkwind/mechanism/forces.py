@@ -14,7 +14,7 @@ from linkwind.mechanism.quaternion import rotate
 from linkwind.mechanism.tree import WORLD, Carrier
 from linkwind.native.expressions import derivatives
 from linkwind.native.multibody import FORCE_TYPES, NQ, Multibody, Tables
-from linkwind.scenario import Body, Circle, Ellipse, Polygon, Rectangle, Scenario
+from linkwind.scenario import Body, Circle, Ellipse, Ellipsoid, Polygon, Rectangle, Scenario
 from linkwind.scenario.forces import Actuator, Buoyancy, Force, PointForce, Spring
 from linkwind.scenario.forces import Motion as Prescribed
 from linkwind.scenario.functions import Function
@@ -310,6 +310,8 @@ def _volume(body: Body, item: str) -> float:
             return math.pi / 4.0 * diameter**2 * span
         case Rectangle(length=length, width=width, radius=radius, span=span):
             return (length * width - (4.0 - math.pi) * radius**2) * span
+        case Ellipsoid(size=(x, y, z)):
+            return math.pi / 6.0 * x * y * z
         case Polygon(points=points, span=span):
             return abs(signed_area(np.array(points))) * span
     got = "no shape" if body.shape is None else f"a {body.shape.type}"

@@ -10,8 +10,9 @@ import numpy as np
 from linkwind.report.arrays import every_nth, pack
 from linkwind.report.data import Run
 from linkwind.report.wires import Line, wires
+from linkwind.scenario import pictures as drawings
 from linkwind.scenario.pictures import pictures_of
-from linkwind.scenario.shapes import shape_of
+from linkwind.scenario.shapes import Ellipsoid, shape_of
 from linkwind.spatial import Array
 
 FRAMES = 1500
@@ -105,6 +106,8 @@ def _lines(body: Mapping[str, Any], joint_points: Array, planar: bool) -> list[L
     shape = shape_of(body.get("shape"))
     if shape is None:
         return [_without_shape(body, joint_points)]
+    if isinstance(shape, Ellipsoid):
+        return wires(drawings.Ellipsoid(type="ellipsoid", size=shape.size))
     outline, half = shape.outline(), 0.5 * shape.span
     near, far = (np.pad(outline, ((0, 0), (0, 1)), constant_values=z) for z in (-half, half))
     if not shape.closed:

@@ -192,30 +192,45 @@ def _provider_model(scenario: Scenario, provider: Provider, path: Path) -> Itera
 
 
 def _flow(scenario: Scenario, provider: Provider, path: Path) -> Iterator[Problem]:
-    """What a two-dimensional flow asks for: planar bodies of one span with shapes, in a uniform wind."""
+    """What a resolved flow asks for: bodies with shapes, in a uniform wind."""
     acted = [(i, body) for i, body in enumerate(scenario.bodies) if body.name in provider.bodies]
-    spans = [(i, body.shape.span) for i, body in acted if body.shape is not None]
     for index, body in acted:
         if body.shape is None:
             expected = f'a shape, which the model of provider "{provider.name}" needs'
             advice = 'Add one, such as shape = { type = "plate", length = … }.'
             yield Problem(("bodies", index, "shape"), expected, "nothing", advice)
-        if not body.planar:
-            expected = "one number: the model flow is two-dimensional"
-            yield Problem(("bodies", index, "inertia"), expected, show(body.inertia), "Give it about z.")
-    for index, span in spans:
-        if span != spans[0][1]:
-            expected = f"the span of the others, {spans[0][1]!r} m: the model flow is two-dimensional"
-            yield Problem(("bodies", index, "shape", "span"), expected, show(span), "Give all the same.")
+    if provider.flow.dimensions == 2:
+        yield from _flow_in_the_plane(scenario, acted)
     if scenario.environment.gusts:
         expected = "none: the model flow has a uniform wind"
         got = f"{len(scenario.environment.gusts)} of them"
         yield Problem(("environment", "gusts"), expected, got, "Remove them, or use the model plate.")
-    if any(component for component in scenario.environment.wind[2:]):
-        expected = "no component along z: the model flow is two-dimensional"
-        yield Problem(("environment", "wind"), expected, show(list(scenario.environment.wind)), "Set z to 0.")
     if scenario.environment.density == 0.0:
         yield Problem(("environment", "density"), "a number above 0 for the model flow", "0", "Give it one.")
+
+
+def _flow_in_the_plane(scenario: Scenario, acted: list[tuple[int, Body]]) -> Iterator[Problem]:
+    """What a two-dimensional flow asks for besides: planar bodies of one span."""
+    otherwise = "or set aero.flow.dimensions = 3."
+    spans = [(i, body.shape.span) for i, body in acted if body.shape is not None]
+    for index, body in acted:
+        if not body.planar:
+            expected = "one number: the flow is two-dimensional"
+            advice = f"Give it about z, {otherwise}"
+            yield Problem(("bodies", index, "inertia"), expected, show(body.inertia), advice)
+        if body.shape is not None and body.shape.type == "ellipsoid":
+            expected = "a shape with an outline: the flow is two-dimensional"
+            advice = f'Use type = "ellipse", {otherwise}'
+            yield Problem(("bodies", index, "shape", "type"), expected, '"ellipsoid"', advice)
+    for index, span in spans:
+        if span != spans[0][1]:
+            expected = f"the span of the others, {spans[0][1]!r} m: the flow is two-dimensional"
+            advice = f"Give all the same, {otherwise}"
+            yield Problem(("bodies", index, "shape", "span"), expected, show(span), advice)
+    if any(component for component in scenario.environment.wind[2:]):
+        expected = "no component along z: the flow is two-dimensional"
+        advice = f"Set z to 0, {otherwise}"
+        yield Problem(("environment", "wind"), expected, show(list(scenario.environment.wind)), advice)
 
 
 def _first(names: Sequence[str]) -> str:

@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import BeforeValidator, Field, PlainSerializer, WithJsonSchema, model_validator
 
 from linkwind.scenario.polars import COLUMNS, Rows
-from linkwind.scenario.problems import Problem, ProblemError, choice, nearest
-from linkwind.scenario.quantities import Name, Section, Vector, quantity
+from linkwind.scenario.problems import Problem, ProblemError, choice, nearest, show
+from linkwind.scenario.quantities import Name, Section, Vector, numbers, quantity
 
 AeroModel = Literal["none", "field", "plate", "flow", "vortex", "fmu", "python"]
 ADDING_INERTIA: tuple[AeroModel, ...] = (
@@ -107,15 +107,32 @@ class PlateModel(Section):
         return self
 
 
-class FlowModel(Section):
-    """Settings of the two-dimensional flow around the bodies, on a lattice."""
+def _lengths(value: Any) -> tuple[float, ...]:
+    expected = "a list of 2 or 3 numbers"
+    if not isinstance(value, list | tuple) or len(value) not in (2, 3):
+        raise ProblemError.value(expected, value, "Write [width, height], or [width, height, depth].")
+    return numbers(value, expected)
 
+
+Lengths = Annotated[
+    tuple[float, ...],
+    BeforeValidator(_lengths),
+    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3}),
+]
+
+
+class FlowModel(Section):
+    """Settings of the resolved flow around the bodies, on a lattice."""
+
+    dimensions: Literal[2, 3] = Field(
+        default=2, description="Of the flow: 2, the same all along the span of planar bodies, or 3"
+    )
     cells: float = quantity("Cells of the lattice along the longest body", "1", 48.0, ge=8.0, le=2000.0)
-    window: tuple[float, float] | None = Field(
+    window: Lengths | None = Field(
         default=None,
-        strict=False,
-        description="Width and height of the window that goes with the mechanism [m]; default: 10 and 8 "
-        "lengths of its longest body more than the mechanism",
+        description="Width, height and, of three dimensions, depth of the window that goes with the "
+        "mechanism [m]; default: 10 and 8 lengths of its longest body more than the mechanism, of three "
+        "dimensions 4, 3 and 3",
         json_schema_extra={"unit": "m"},
     )
     start_time: float | None = quantity(
@@ -128,6 +145,14 @@ class FlowModel(Section):
     threads: int = Field(
         default=1, ge=1, le=256, description="Threads that share the work; no bit depends on it"
     )
+
+    @model_validator(mode="after")
+    def _window_of_these_dimensions(self) -> FlowModel:
+        if self.window is not None and len(self.window) != self.dimensions:
+            expected = f"{self.dimensions} lengths, as many as dimensions"
+            advice = "Write [width, height, depth] where dimensions is 3, else [width, height]."
+            raise ProblemError([Problem(("window",), expected, show(list(self.window)), advice)])
+        return self
 
 
 # Angles of attack [deg]: from about the first on a real flow separates from a thin wing; beyond the second

@@ -1,7 +1,7 @@
 """Shapes of bodies: what a scenario may say of them, and their outline in the body frame.
 
 An outline lies in the body's x, y plane, centred at the centre of mass, counter-clockwise, its first point
-not repeated; the body reaches half its ``span`` to each side of that plane.
+not repeated; the body reaches half its ``span`` to each side of that plane, as a cylinder but for ellipsoids.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, TypeAdapter, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, Field, TypeAdapter, WithJsonSchema, field_validator, model_validator
 
 from linkwind.scenario.problems import Problem, ProblemError, show
-from linkwind.scenario.quantities import Section, numbers, quantity
+from linkwind.scenario.quantities import Section, Vector, Vector3, numbers, quantity
 from linkwind.spatial import Array
 
 Point = tuple[float, float]
@@ -122,6 +122,36 @@ class Rectangle(Section):
         return distinct
 
 
+class Ellipsoid(Section):
+    """An ellipsoid, a ball where its sizes are equal; of a mechanism in space."""
+
+    closed: ClassVar[bool] = True
+
+    type: Literal["ellipsoid"] = Field(description=_KIND)
+    size: Vector = quantity("Whole lengths along the body's axes x, y and z", "m")
+
+    @field_validator("size")
+    @classmethod
+    def _has_volume(cls, size: Vector3) -> Vector3:
+        if min(size) <= 0.0:
+            raise ProblemError.value("3 numbers above 0", list(size), "Correct it.")
+        return size
+
+    @property
+    def span(self) -> float:
+        """Extent along the body's z axis [m]."""
+        return self.size[2]
+
+    @property
+    def reference_length(self) -> float:
+        """Longest extent in the x, y plane [m]."""
+        return max(self.size[:2])
+
+    def outline(self, n: int = ROUND) -> Array:
+        """Return ``n`` points of its cut with the x, y plane [m], shape (n, 2)."""
+        return 0.5 * np.array(self.size[:2]) * _circle(n)
+
+
 def _points(value: Any) -> tuple[Point, ...]:
     expected = "a list of at least 3 points [x, y]"
     advice = "Write [[x, y], [x, y], [x, y]], in the body frame from the centre of mass."
@@ -177,7 +207,7 @@ class Polygon(Section):
         return points if signed_area(points) > 0.0 else points[::-1].copy()
 
 
-AnyShape = Plate | Ellipse | Rectangle | Circle | Polygon
+AnyShape = Plate | Ellipse | Rectangle | Circle | Polygon | Ellipsoid
 
 _ANY: TypeAdapter[AnyShape] = TypeAdapter(Annotated[AnyShape, Field(discriminator="type")])
 
