@@ -1,14 +1,14 @@
 """Pictures of the fluid, as a force model shows them: arrays to bytes and back.
 
-A frame is one of two kinds, the fluid on a grid (``flow``) or wings with their wakes (``wake``). The schema
-is ``schemas/linkwind/v1/observe.proto``.
+A frame is one of three kinds: the fluid in a plane (``flow``) or in a box (``volume``), on a grid, or wings
+with their wakes (``wake``). The schema is ``schemas/linkwind/v1/observe.proto``.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 from google.protobuf.message import DecodeError
@@ -154,9 +154,8 @@ class WakeFrame:
             ProtocolError: an array has another shape than the strengths ask for.
         """
         wings, rows, columns = self.shape
-        sender = {"run": run, "provider": provider, "number": number} if number else {}
         message = MESSAGES["WakeFrame"](
-            **sender, step=self.step, time_ns=self.time_ns,
+            **_sender(run, provider, number), step=self.step, time_ns=self.time_ns,
             wings=wings, rows=rows, columns=columns, bound=self.bound,
         )  # fmt: skip
         return _with_arrays(message, self, provider)
@@ -167,8 +166,82 @@ class WakeFrame:
         return cls(message.step, message.time_ns, message.bound, **arrays)
 
 
-Frame = FlowFrame | WakeFrame
-KINDS: dict[str, type[FlowFrame] | type[WakeFrame]] = {each.KIND: each for each in (FlowFrame, WakeFrame)}
+@dataclass(frozen=True, eq=False)
+class VolumeFrame:
+    """The fluid in a box at one time, on cubic cells; values at the centres of the cells.
+
+    Layers go up along z, rows along y, columns along x; two or more of each, so that velocity has a gradient.
+
+    Attributes:
+        step: index k of the communication point that the fluid is at.
+        time_ns: its simulation time t_k [ns].
+        origin: centre of the first cell (x, y, z) [m], in W.
+        cell: side of a cell [m].
+        velocity: [m/s], shape (layers, rows, columns, 3), in W.
+        pressure: relative to the undisturbed fluid [Pa], shape (layers, rows, columns).
+    """
+
+    KIND: ClassVar = "volume"
+    MESSAGE: ClassVar = "VolumeFrame"
+    PLACE: ClassVar = ("origin", "cell")
+    ARRAYS: ClassVar = ("velocity", "pressure")
+
+    step: int
+    time_ns: int
+    origin: tuple[float, float, float]
+    cell: float
+    velocity: Single
+    pressure: Single
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Layers, rows and columns."""
+        layers, rows, columns = self.pressure.shape
+        return layers, rows, columns
+
+    @property
+    def extent(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """Outer corners of the box with the lowest and with the highest x, y, z [m], in W."""
+        half, (x, y, z), (layers, rows, columns) = 0.5 * self.cell, self.origin, self.shape
+        low = (x - half, y - half, z - half)
+        return low, (low[0] + columns * self.cell, low[1] + rows * self.cell, low[2] + layers * self.cell)
+
+    @staticmethod
+    def shapes(about: Any) -> dict[str, tuple[int, ...]]:
+        """Return the shape of each array of a message."""
+        cells = (about.layers, about.rows, about.columns)
+        return {"velocity": (*cells, 3), "pressure": cells}
+
+    def encode(self, run: str = "", provider: str = "", number: int = 0) -> bytes:
+        """Return the message VolumeFrame; without arguments, as a log holds it.
+
+        Args:
+            run: id of the run.
+            provider: that shows the frame.
+            number: of the provider's frames, from 1.
+
+        Raises:
+            ProtocolError: an array has another shape than the pressure.
+        """
+        (layers, rows, columns), (x, y, z) = self.shape, self.origin
+        message = MESSAGES["VolumeFrame"](
+            **_sender(run, provider, number), step=self.step, time_ns=self.time_ns,
+            layers=layers, rows=rows, columns=columns, cell=self.cell, origin_x=x, origin_y=y, origin_z=z,
+        )  # fmt: skip
+        return _with_arrays(message, self, provider)
+
+    @classmethod
+    def of(cls, message: Any, arrays: dict[str, Single]) -> VolumeFrame:
+        """Return the frame that a message holds."""
+        origin = (message.origin_x, message.origin_y, message.origin_z)
+        return cls(message.step, message.time_ns, origin, message.cell, **arrays)
+
+
+Frame = FlowFrame | VolumeFrame | WakeFrame
+KINDS: dict[str, type[FlowFrame] | type[VolumeFrame] | type[WakeFrame]] = {
+    each.KIND: each for each in (FlowFrame, VolumeFrame, WakeFrame)
+}
+Logged = TypeVar("Logged", VolumeFrame, WakeFrame)
 
 
 def decode(sent: Sent, run: str, provider: str) -> tuple[int, Frame]:
@@ -192,15 +265,15 @@ def decode(sent: Sent, run: str, provider: str) -> tuple[int, Frame]:
     return message.number, _frame(sent.kind, message, what)
 
 
-def logged_wake(payload: bytes) -> WakeFrame:
-    """Return the frame of a message WakeFrame without a sender.
+def logged(kind: type[Logged], payload: bytes) -> Logged:
+    """Return the frame of a message without a sender, as a log holds it.
 
     Raises:
-        ProtocolError: it is none, or its sizes do not fit.
+        ProtocolError: it is none of this kind, or its sizes do not fit.
     """
-    what = "expected a WakeFrame"
-    frame = _frame(WakeFrame.KIND, _parsed(Sent(WakeFrame.KIND, payload), what), what)
-    assert isinstance(frame, WakeFrame)
+    what = f"expected a {kind.MESSAGE}"
+    frame = _frame(kind.KIND, _parsed(Sent(kind.KIND, payload), what), what)
+    assert isinstance(frame, kind)
     return frame
 
 
@@ -216,6 +289,11 @@ def _frame(kind: str, message: Any, what: str) -> Frame:
     frame = KINDS[kind].of(message, {name: _array(message, name, shapes[name], what) for name in shapes})
     if isinstance(frame, WakeFrame) and frame.bound > message.rows:
         raise ProtocolError(f"{what}: bound: expected at most {message.rows} rows; got {frame.bound}")
+    if isinstance(frame, VolumeFrame) and not (min(frame.shape) > 1 and frame.cell > 0.0):
+        raise ProtocolError(
+            f"{what}: expected two or more layers, rows and columns of cells above 0 m; "
+            f"got {frame.shape} of {frame.cell:g} m"
+        )
     return frame
 
 
@@ -227,6 +305,11 @@ def _array(message: Any, name: str, shape: tuple[int, ...], what: str) -> Single
     if len(data) != expected:
         raise ProtocolError(f"{what}: {name}: expected {expected} bytes for {shape}; got {len(data)}")
     return np.frombuffer(data, SINGLE).reshape(shape)
+
+
+def _sender(run: str, provider: str, number: int) -> dict[str, Any]:
+    """Return the fields that tell who sent a frame, none for one in a log."""
+    return {"run": run, "provider": provider, "number": number} if number else {}
 
 
 def _with_arrays(message: Any, frame: Frame, provider: str) -> bytes:

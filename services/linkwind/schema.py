@@ -23,8 +23,8 @@ def _classes() -> dict[str, Any]:
     for file in descriptor_pb2.FileDescriptorSet.FromString(DESCRIPTOR_SET).file:
         pool.Add(file)
     names = (
-        "MotionStep", "WrenchStep", "Motion", "Control", "FlowFrame", "WakeFrame", "Checkpoint", "State",
-        "Step", "Timing", "Description", "Ending", "Playback",
+        "MotionStep", "WrenchStep", "Motion", "Control", "FlowFrame", "VolumeFrame", "WakeFrame",
+        "Checkpoint", "State", "Step", "Timing", "Description", "Ending", "Playback",
     )  # fmt: skip
     return {
         name: message_factory.GetMessageClass(pool.FindMessageTypeByName(f"linkwind.v1.{name}"))

@@ -19,7 +19,7 @@ import numpy as np
 
 from linkwind.checkpoints import Checkpoint
 from linkwind.errors import ParticipantError, SimulationError
-from linkwind.frames import FlowFrame, Sent, WakeFrame
+from linkwind.frames import FlowFrame, Sent, VolumeFrame, WakeFrame
 from linkwind.messages import MotionMessage, WrenchMessage
 from linkwind.protocol import DynamicsSession, ProviderSession, ProviderState, fault, fault_error
 from linkwind.schema import MESSAGES, SHA256
@@ -42,6 +42,8 @@ def good() -> dict[str, bytes]:
     wake = WakeFrame(
         1, 1_000_000, 1, np.zeros((2, 4, 3, 3), np.float32), np.zeros((2, 3, 2), np.float32)
     )  # fmt: skip
+    box = np.zeros((2, 3, 4, 3), np.float32)
+    volume = VolumeFrame(1, 1_000_000, (0.0, 0.0, 0.0), 0.1, box, box[..., 0])
     control = MESSAGES["Control"]
     hello = {"name": "aero", "schema_sha256": SHA256, "version": "0", "instance": "x"}
     welcome = {
@@ -52,6 +54,7 @@ def good() -> dict[str, bytes]:
         "motion": motion.payload(),
         "wrench": wrench.payload(),
         "frame": frame.encode(RUN, "aero", 1),
+        "volume": volume.encode(RUN, "aero", 1),
         "wake": wake.encode(RUN, "aero", 1),
         "checkpoint": Checkpoint(1, 1_000_000, b"memory").encode(RUN, "aero", 1),
         "hello": control(hello=hello).SerializeToString(),
@@ -163,8 +166,8 @@ class Ends:
             return "dropped"
         if kind == "frame":
             dynamics.frame("aero", Sent("flow", payload))
-        elif kind == "wake":
-            dynamics.frame("aero", Sent("wake", payload))
+        elif kind in ("volume", "wake"):
+            dynamics.frame("aero", Sent(kind, payload))
         elif kind == "checkpoint":
             dynamics.checkpoint("aero", payload)
         elif kind == "welcome":

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from google.protobuf.json_format import MessageToDict, ParseDict
 
-from linkwind.frames import FlowFrame, Sent, WakeFrame, decode
+from linkwind.frames import FlowFrame, Sent, VolumeFrame, WakeFrame, decode
 from linkwind.messages import MotionMessage, WrenchMessage
 from linkwind.schema import MESSAGES
 
@@ -47,6 +47,7 @@ def vectors() -> dict[str, tuple[str, dict[str, Any]]]:
         "wrench": ("WrenchStep", {**wrench, **loads}),
         "wrench_added_inertia": ("WrenchStep", {**wrench, **loads, "addedInertia": numbers(72, 0.3)}),
         "flow_frame": ("FlowFrame", flow_frame()),
+        "volume_frame": ("VolumeFrame", volume_frame()),
         "wake_frame": ("WakeFrame", wake_frame()),
         "checkpoint": ("Checkpoint", checkpoint()),
         "welcome_resume": ("Control", {"welcome": welcome()}),
@@ -103,6 +104,17 @@ def flow_frame() -> dict[str, Any]:
     where = {"cell": 0.1, "originX": -0.0, "originY": -1.25, "rows": 2, "columns": 3}
     when = {"number": "4", "step": "120", "timeNs": "120000000"}
     return {"run": "golden", "provider": "aero", **when, **where, **arrays}
+
+
+def volume_frame() -> dict[str, Any]:
+    """Two layers of two rows of three cells; bytes are base64 in JSON."""
+    values = np.array(numbers(48, 0.25), "<f4")
+    parts = {"velocity": values[:36], "pressure": values[36:]}
+    arrays = {name: base64.b64encode(part.tobytes()).decode() for name, part in parts.items()}
+    where = {"cell": 0.1, "originX": -0.0, "originY": -1.25, "originZ": 0.7}
+    size = {"layers": 2, "rows": 2, "columns": 3}
+    when = {"number": "4", "step": "120", "timeNs": "120000000"}
+    return {"run": "golden", "provider": "aero", **when, **size, **where, **arrays}
 
 
 def wake_frame() -> dict[str, Any]:
@@ -174,6 +186,18 @@ def test_a_frame_is_written_and_read_as_the_golden_bytes() -> None:
     assert (number, frame.step, frame.time_ns, frame.shape) == (4, 120, 120_000_000, (2, 3))
     assert (frame.cell, frame.origin) == (0.1, (-0.0, -1.25))
     assert frame.vorticity.tobytes() == base64.b64decode(values["vorticity"])
+    assert frame.encode("golden", "aero", 4) == encoded
+
+
+def test_a_box_of_fluid_is_written_and_read_as_the_golden_bytes() -> None:
+    values, encoded = golden("volume_frame")
+    number, frame = decode(Sent("volume", encoded), "golden", "aero")
+    assert isinstance(frame, VolumeFrame)
+    assert (number, frame.step, frame.time_ns, frame.shape) == (4, 120, 120_000_000, (2, 2, 3))
+    assert (frame.cell, frame.origin) == (0.1, (-0.0, -1.25, 0.7))
+    # The second layer begins with number 18, its second row 9 further, the second cell of that 3 further.
+    assert frame.velocity[1, 1, 1].tolist() == np.array(numbers(48, 0.25)[30:33], "<f4").tolist()
+    assert frame.pressure.tobytes() == base64.b64decode(values["pressure"])
     assert frame.encode("golden", "aero", 4) == encoded
 
 

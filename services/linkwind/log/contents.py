@@ -16,13 +16,15 @@ PACKAGE = "linkwind.v1."
 
 MOTION, STATE, STEP, TIMING = "/motion", "/state", "/step", "/timing"
 WRENCH = "/wrench/"  # and the name of the provider
-FLOW, WAKE = "/flow/", "/wake/"  # frames, and the name of the provider: foxglove.Grid; WakeFrame, no sender
-FRAMES = (FLOW, WAKE)
+FLOW = "/flow/"  # and the name of the provider: foxglove.Grid
+VOLUME, WAKE = "/volume/", "/wake/"  # and the name of the provider: VolumeFrame, WakeFrame, without a sender
+FRAMES = (FLOW, VOLUME, WAKE)
 CHECKPOINT = "/checkpoint/"  # and the name of the provider
 TRANSFORMS, SCENE = "/tf", "/scene"  # pictures for Foxglove, decimated
-WAKE_SCENE = "/scene/wake/"  # and the name of the provider: its wakes, for Foxglove
+SCENE_OF = {kind: f"{SCENE}{kind}" for kind in (VOLUME, WAKE)}  # and the provider: its frames, for Foxglove
 
 MESSAGE_OF = {MOTION: "MotionStep", STATE: "State", STEP: "Step", TIMING: "Timing"}
+MESSAGES_OF = {WRENCH: "WrenchStep", VOLUME: "VolumeFrame", WAKE: "WakeFrame", CHECKPOINT: "Checkpoint"}
 
 SCENARIO = "scenario.json"  # attachment: the resolved scenario
 
@@ -50,7 +52,7 @@ def providers(kind: str, topics: Iterable[str]) -> tuple[str, ...]:
 
 def message_name(topic: str) -> str | None:
     """Return the name of the message that a topic carries, None for a topic that is not linkwind's."""
-    for start, name in ((WRENCH, "WrenchStep"), (WAKE, "WakeFrame"), (CHECKPOINT, "Checkpoint")):
+    for start, name in MESSAGES_OF.items():
         if topic.startswith(start):
             return name
     return MESSAGE_OF.get(topic)

@@ -1,11 +1,16 @@
-"""Frames as the log holds them: a flow as ``foxglove.Grid``, wakes as ``WakeFrame`` without its sender."""
+"""Frames as the log holds them: a flow as ``foxglove.Grid``, others as they were sent, without their sender.
+
+With these others goes a picture for Foxglove, which does not know them.
+"""
 
 from __future__ import annotations
 
 from linkwind.errors import LogError, ProtocolError
-from linkwind.frames import FlowFrame, Frame, logged_wake
-from linkwind.log import contents, grid
+from linkwind.frames import FlowFrame, Frame, VolumeFrame, WakeFrame, logged
+from linkwind.log import contents, grid, volumes, wakes
 from linkwind.log.chunks import SchemaInfo
+
+PICTURES = {contents.VOLUME: volumes.picture, contents.WAKE: wakes.picture}
 
 
 def topic_of(frame: Frame, provider: str) -> str:
@@ -33,6 +38,16 @@ def decode(topic: str, schema: SchemaInfo, payload: bytes, step_ns: int) -> Fram
     if topic.startswith(contents.FLOW):
         return grid.decode(payload, schema.name, schema.data, step_ns)
     try:
-        return logged_wake(payload)
+        if topic.startswith(contents.VOLUME):
+            return logged(VolumeFrame, payload)
+        return logged(WakeFrame, payload)
     except ProtocolError as error:
         raise LogError(str(error)) from error
+
+
+def picture(topic: str, payload: bytes) -> tuple[str, bytes] | None:
+    """Return topic and message of the picture that goes with a logged message; None for one without."""
+    for kind, drawn in PICTURES.items():
+        if topic.startswith(kind):
+            return contents.SCENE_OF[kind] + topic.removeprefix(kind), drawn(payload)
+    return None

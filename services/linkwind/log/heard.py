@@ -22,7 +22,6 @@ from linkwind.log import contents, frames
 from linkwind.log.chunks import SchemaInfo
 from linkwind.log.copies import CopyWriter
 from linkwind.log.scene import Scene
-from linkwind.log.wakes import picture
 from linkwind.schema import MESSAGES
 from linkwind.spatial import Motion
 from linkwind.wire import FixedLayout
@@ -76,8 +75,8 @@ class HeardLog:
         elif topic == contents.STEP:  # a run draws a point when that is written
             for drawn in self._pictures.due():
                 self._draw(*drawn)
-        elif topic.startswith(contents.WAKE):
-            self._draw(contents.WAKE_SCENE + topic.removeprefix(contents.WAKE), time_ns, picture(payload))
+        elif (picture := frames.picture(topic, payload)) is not None:
+            self._draw(picture[0], time_ns, picture[1])
 
     def _draw(self, topic: str, time_ns: int, drawn: bytes) -> None:
         """Write a picture, which is of a topic that listeners do not get."""
@@ -164,6 +163,7 @@ def _schema(topic: str) -> SchemaInfo:
     name = contents.message_name(topic)
     if name is not None:
         return SchemaInfo(contents.PACKAGE + name, "protobuf", schema.DESCRIPTOR_SET)
-    kind: Any = SceneUpdate if topic.startswith(contents.WAKE_SCENE) else PICTURES.get(topic, Grid)
+    shown = topic.startswith(tuple(contents.SCENE_OF.values()))
+    kind: Any = SceneUpdate if shown else PICTURES.get(topic, Grid)
     found = kind.get_schema()
     return SchemaInfo(found.name, found.encoding, found.data)

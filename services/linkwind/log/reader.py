@@ -20,7 +20,7 @@ from typing import Any
 from google.protobuf.message import DecodeError
 
 from linkwind.errors import LogError
-from linkwind.frames import FlowFrame, Frame, WakeFrame
+from linkwind.frames import FlowFrame, Frame, VolumeFrame, WakeFrame
 from linkwind.log import contents, frames, tables
 from linkwind.log.chunks import ChannelInfo, Data, Message, Span, chunk_records, latest, messages_of
 from linkwind.log.facts import Damage, DecodedMessage, LogInfo, RawMessage
@@ -151,8 +151,13 @@ class Log(Head):
 
     @property
     def flows(self) -> tuple[str, ...]:
-        """Providers of whose fluid there are frames on a grid."""
+        """Providers of whose fluid there are frames in a plane."""
         return contents.providers(contents.FLOW, self.topics)
+
+    @property
+    def volumes(self) -> tuple[str, ...]:
+        """Providers of whose fluid there are frames in a box."""
+        return contents.providers(contents.VOLUME, self.topics)
 
     @property
     def wakes(self) -> tuple[str, ...]:
@@ -167,12 +172,16 @@ class Log(Head):
         """
         return (f for f in self.shown(contents.FLOW + provider) if isinstance(f, FlowFrame))
 
+    def volume_frames(self, provider: str) -> Iterator[VolumeFrame]:
+        """Iterate like :meth:`frames` over a provider's fluid in a box."""
+        return (f for f in self.shown(contents.VOLUME + provider) if isinstance(f, VolumeFrame))
+
     def wake_frames(self, provider: str) -> Iterator[WakeFrame]:
         """Iterate like :meth:`frames` over a provider's wings with their wakes."""
         return (f for f in self.shown(contents.WAKE + provider) if isinstance(f, WakeFrame))
 
     def shown(self, topic: str) -> Iterator[Frame]:
-        """Iterate like :meth:`frames` over the frames of a topic, of either kind."""
+        """Iterate like :meth:`frames` over the frames of a topic, of any kind."""
         for channel, _, _, payload in self.messages(topic):
             yield self._frame(channel, payload)
 

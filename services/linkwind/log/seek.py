@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from linkwind.errors import LogError
-from linkwind.frames import FlowFrame, Frame, WakeFrame
+from linkwind.frames import FlowFrame, Frame, VolumeFrame, WakeFrame
 from linkwind.log import contents, frames
 from linkwind.log.chunks import MESSAGE, messages_of
 from linkwind.log.head import Head, check_magic
@@ -58,8 +58,13 @@ class SeekableLog(Head):
 
     @property
     def flows(self) -> tuple[str, ...]:
-        """Providers of whose fluid there are frames on a grid."""
+        """Providers of whose fluid there are frames in a plane."""
         return self._providers(contents.FLOW)
+
+    @property
+    def volumes(self) -> tuple[str, ...]:
+        """Providers of whose fluid there are frames in a box."""
+        return self._providers(contents.VOLUME)
 
     @property
     def wakes(self) -> tuple[str, ...]:
@@ -141,6 +146,11 @@ class SeekableLog(Head):
         """
         found = self._shown(contents.FLOW + provider, time_ns, step_ns)
         return found if isinstance(found, FlowFrame) else None
+
+    def volume_frame(self, provider: str, time_ns: int, step_ns: int) -> VolumeFrame | None:
+        """Return a provider's fluid in a box at a time [ns], like :meth:`frame`."""
+        found = self._shown(contents.VOLUME + provider, time_ns, step_ns)
+        return found if isinstance(found, VolumeFrame) else None
 
     def wake_frame(self, provider: str, time_ns: int, step_ns: int) -> WakeFrame | None:
         """Return a provider's wings and wakes at a time [ns], like :meth:`frame`."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from foxglove.messages import Color, Point3, SceneEntity, SceneUpdate, TriangleListPrimitive
 
-from linkwind.frames import Single, logged_wake
+from linkwind.frames import Single, WakeFrame, logged
 from linkwind.log.rings import thinned
 from linkwind.log.scene import timestamp
 from linkwind.log.solids import ORIGIN
@@ -17,7 +17,7 @@ POSITIVE, NONE, NEGATIVE = (0.71, 0.02, 0.15), (0.87, 0.87, 0.87), (0.23, 0.30, 
 
 def picture(payload: bytes) -> bytes:
     """Return a ``SceneUpdate`` of a logged frame: the wakes of all wings, on the frame's own scale."""
-    frame = logged_wake(payload)
+    frame = logged(WakeFrame, payload)
     corner, strength, _ = thinned(frame, RINGS)
     wakes = zip(corner[:, frame.bound :], strength[:, frame.bound :], strict=True)
     top, stamp = float(np.abs(strength).max()) or 1.0, timestamp(frame.time_ns)
@@ -50,12 +50,12 @@ def _mesh(corner: Single, strength: Single, top: float) -> TriangleListPrimitive
     return TriangleListPrimitive(
         pose=ORIGIN,
         points=[Point3(x=x, y=y, z=z) for x, y, z in corner.reshape(-1, 3).tolist()],
-        colors=[_color(each) for each in share.tolist()],
+        colors=[color(each) for each in share.tolist()],
         indices=indices.ravel().tolist(),
     )
 
 
-def _color(share: float) -> Color:
+def color(share: float) -> Color:
     """Return the colour of a circulation, as a share of the largest one."""
     end = POSITIVE if share > 0.0 else NEGATIVE
     r, g, b = (none + abs(share) * (most - none) for most, none in zip(end, NONE, strict=True))

@@ -28,7 +28,6 @@ from linkwind.log import contents, frames
 from linkwind.log.scene import Scene
 from linkwind.log.sink import Sink
 from linkwind.log.versions import versions
-from linkwind.log.wakes import picture
 from linkwind.spatial import Array, Motion
 
 _log = logging.getLogger("linkwind")
@@ -205,16 +204,17 @@ class LogWriter:
         self.copy(contents.CHECKPOINT + provider, payload, time_ns)
 
     def copy(self, topic: str, payload: bytes, time_ns: int) -> None:
-        """Log a timing, a frame or a checkpoint as another log has it; of a wake a picture with it."""
+        """Log a timing, a frame or a checkpoint as another log has it, and the picture that goes with it."""
+        kind = Grid.get_schema() if topic.startswith(contents.FLOW) else None
+        self._copy(topic, payload, time_ns, kind)
+        picture = frames.picture(topic, payload)
+        if picture is not None:
+            self._copy(*picture, time_ns, SceneUpdate.get_schema())
+
+    def _copy(self, topic: str, payload: bytes, time_ns: int, kind: Schema | None) -> None:
         if topic not in self._rare:
-            kind = Grid.get_schema() if topic.startswith(contents.FLOW) else None
             self._rare[topic] = self._channel(topic, kind)
         self._rare[topic](payload, time_ns)
-        if topic.startswith(contents.WAKE):
-            shown = contents.WAKE_SCENE + topic.removeprefix(contents.WAKE)
-            if shown not in self._rare:
-                self._rare[shown] = self._channel(shown, SceneUpdate.get_schema())
-            self._rare[shown](picture(payload), time_ns)
 
     def diagnostics(self, names: Mapping[str, Sequence[str]]) -> None:
         """Record the names of the numbers that providers report with their wrenches; none, nothing."""

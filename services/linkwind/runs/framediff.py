@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from linkwind.frames import FlowFrame, Frame, WakeFrame
+from linkwind.frames import Frame, WakeFrame
 from linkwind.log.compare import FieldDifference, deviation, largest
 from linkwind.log.difference import Difference, single_ulp
 from linkwind.log.reader import Log
@@ -88,9 +88,9 @@ def _same_cells(left: Frame, right: Frame, rtol: float) -> bool:
 
 
 def _where(frame: Frame) -> str:
-    if isinstance(frame, FlowFrame):
-        return str(frame.extent)
-    return f"{frame.shape} rings, {frame.bound} rows of them on the wing"
+    if isinstance(frame, WakeFrame):
+        return f"{frame.shape} rings, {frame.bound} rows of them on the wing"
+    return str(frame.extent)
 
 
 def _worst(one: Any, other: Any, limit: float, rtol: float) -> tuple[tuple[Any, ...], float] | None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from linkwind.log.contents import FLOW, SCENE, STATE, WAKE_SCENE
+from linkwind.log.contents import FLOW, SCENE, SCENE_OF, STATE, VOLUME, WAKE
 from linkwind.scenario.shapes import shape_of
 from linkwind.view.film import Film
 from linkwind.view.recording import Recording
@@ -30,7 +30,7 @@ LENGTHS = 8.0  # of the longest body, that the camera sees
 def layout(recording: Recording) -> dict[str, Any]:
     """Return the layout that suits a log."""
     scenario = recording.scenario
-    flat = recording.flat and not recording.log.wakes
+    flat = recording.flat and not (recording.log.volumes or recording.log.wakes)
     names = [body["name"] for body in scenario["bodies"]][:BODIES]
     axes = "xy" if flat else "xyz"
     plots = {
@@ -64,7 +64,8 @@ def _scene(recording: Recording, followed: str, *, flat: bool) -> dict[str, Any]
     shapes = [shape_of(body.get("shape")) for body in recording.scenario["bodies"]]
     length = max((shape.reference_length for shape in shapes if shape), default=1.0)
     topics: dict[str, Any] = {SCENE: {"visible": True}}
-    topics |= {WAKE_SCENE + provider: {"visible": True} for provider in recording.log.wakes}
+    for kind, shown in ((VOLUME, recording.log.volumes), (WAKE, recording.log.wakes)):
+        topics |= {SCENE_OF[kind] + provider: {"visible": True} for provider in shown}
     for provider in recording.log.flows:
         scale = Film(recording, provider).reel()["quantities"]["vorticity"]
         topics[FLOW + provider] = {

@@ -12,7 +12,7 @@ from linkwind.aero.base import Capabilities, body_indices, item
 from linkwind.aero.vortex.surface import plates, surfaces, trailing
 from linkwind.aero.wind import wind_table
 from linkwind.errors import ProtocolError, SimulationError
-from linkwind.frames import Single, WakeFrame, logged_wake
+from linkwind.frames import Single, WakeFrame, logged
 from linkwind.native.vortex import VortexLattice
 from linkwind.native.wind import wind_at
 from linkwind.scenario import Provider, Scenario
@@ -125,7 +125,7 @@ class Vortex:
                 raise ValueError(f"a frame of up to {len(blob) - head} bytes; got {size}")
             due, lattice = blob[head : head + size], blob[head + size :]
             self._lay(sides.copy()).restore(lattice)
-            self._due = logged_wake(due) if due and self._every else None
+            self._due = logged(WakeFrame, due) if due and self._every else None
         except (ValueError, ProtocolError) as error:
             raise ProtocolError(f"model vortex: expected a checkpoint of {error}.") from error
 
