@@ -15,7 +15,10 @@
 #include "lw_instructions.h"
 #include "lw_threads.h"
 
-enum { LW_DIRECTIONS3 = 19 };
+enum {
+    LW_DIRECTIONS3 = 19,
+    LW_VOLUME_PADDING = 16 /* floats behind the cells of a volume that may be read, never used */
+};
 
 /* Cell (i, j, k) of a volume is at [(k * ny + j) * nx + i], x along i, y along j, z along k. */
 typedef struct {
@@ -24,9 +27,12 @@ typedef struct {
                                    outermost, by 0.3 ((fringe - k) / fringe)^3 in a step */
     float shear_rate;           /* omega = 1 / (3 nu + 1/2), nu the kinematic viscosity [cells^2/step] */
     float stream[3];            /* velocity of the undisturbed fluid [cells/step] */
-    int64_t volume;             /* floats from one volume of populations to the next */
+    int64_t volume;             /* floats from one volume of populations to the next, at least
+                                   nx ny nz + LW_VOLUME_PADDING, in the same memory 2 ny + 3 rows more */
     float *populations, *next;  /* (19, nz, ny, nx), volumes `volume` apart: after the collision, less the weight
-                                   of the direction; exchanged by a step */
+                                   of the direction; exchanged by a step. One is 2 ny + 3 rows behind the other,
+                                   which moves a third less through the memory; or each has its own, which
+                                   threads need */
     float *force;               /* (3, nz, ny, nx) force on the fluid of each cell, x, y and z, in this step */
     uint8_t *forced;            /* (nz, ny) whether a row of `force` is read; the others count as zero */
     float *blend;               /* (nx) by how much each column relaxes; written by lw_lattice3_init */
@@ -53,5 +59,8 @@ LW_API int lw_lattice3_halve_step(lw_lattice3 *lattice, float shear_rate);
 
 /* The populations of the stream, less the weights. */
 void lw_lattice3_stream(const lw_lattice3 *lattice, float populations[LW_DIRECTIONS3]);
+
+/* By how much the layer at `distance` from the border relaxes in a step. */
+float lw_lattice3_blend(const lw_lattice3 *lattice, int32_t distance);
 
 #endif

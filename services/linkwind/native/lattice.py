@@ -98,15 +98,15 @@ class Lattice:
             raise ValueError(f"threads: expected 1 or more; got {threads}")
         self.nx, self.ny, self.fringe, self.threads = nx, ny, fringe, threads
         plane = -(-nx * (ny + _APART) // 16) * 16 + _PADDING
-        self._memory = _aligned((1 if threads == 1 else 2) * DIRECTIONS * plane)
+        self._memory = aligned((1 if threads == 1 else 2) * DIRECTIONS * plane)
         planes = self._memory.reshape(-1, DIRECTIONS, plane)
         begins = (planes[0], planes[0, :, _APART * nx :]) if threads == 1 else planes
         self._places: list[Floats] = [of[:, : nx * ny].reshape(DIRECTIONS, ny, nx) for of in begins]
-        self.force = _aligned(2 * ny * nx).reshape(2, ny, nx)
+        self.force = aligned(2 * ny * nx).reshape(2, ny, nx)
         self._blend = np.zeros(nx, dtype=np.float32)
-        first, second = map(_address, self._places)
-        self.force_address = _address(self.force)
-        rest = (plane, first, second, self.force_address, _address(self._blend))
+        first, second = map(address, self._places)
+        self.force_address = address(self.force)
+        rest = (plane, first, second, self.force_address, address(self._blend))
         self._struct = _Lattice(nx, ny, fringe, 0, ny, 0.0, (0.0, 0.0), *rest)
         self.shear_rate, self.stream = shear_rate, stream
         self.struct_address = ctypes.addressof(self._struct)
@@ -125,7 +125,7 @@ class Lattice:
         Shape (9, ny, nx), a view of where they are now: a step puts them elsewhere and may write over it.
         """
         first, second = self._places
-        return first if self._struct.populations == _address(first) else second
+        return first if self._struct.populations == address(first) else second
 
     @property
     def shear_rate(self) -> float:
@@ -193,7 +193,7 @@ class Lattice:
             raise ValueError(f"stride: expected 1 … {min(self.nx, self.ny) // 2}; got {stride}")
         velocity = np.empty((2, self.ny // stride, self.nx // stride), dtype=np.float32)
         density = np.empty(velocity.shape[1:], dtype=np.float32)
-        self._moments(self.struct_address, stride, _address(velocity), _address(density))
+        self._moments(self.struct_address, stride, address(velocity), address(density))
         vorticity = np.gradient(velocity[1], stride, axis=1) - np.gradient(velocity[0], stride, axis=0)
         return Picture(velocity, density, vorticity)
 
@@ -241,12 +241,13 @@ def _check_size(nx: int, ny: int, fringe: int) -> None:
             raise ValueError(f"{name}: expected at least 2 fringe + 8 = {2 * fringe + 8} cells; got {size}")
 
 
-def _aligned(count: int) -> Floats:
+def aligned(count: int) -> Floats:
     """Return zeros at the start of a cache line."""
     memory = np.zeros(count + 16, dtype=np.float32)
-    start = -_address(memory) % 64 // 4
+    start = -address(memory) % 64 // 4
     return memory[start : start + count]
 
 
-def _address(array: Floats) -> int:
+def address(array: Floats | NDArray[np.uint8]) -> int:
+    """Return where an array begins in memory."""
     return int(array.__array_interface__["data"][0])
