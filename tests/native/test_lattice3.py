@@ -1,4 +1,4 @@
-"""The fluid in space against exact solutions, balances, the one in a plane, and its collision by definition."""
+"""The fluid in space against exact solutions, balances, that in a plane, and its collision by definition."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def test_a_uniform_stream_stays():
     np.testing.assert_allclose(before, equilibrium(np.ones((40, 41, 48)), stream), rtol=0, atol=ULP / 8)
     for k in range(100):
         lattice.step((k % 3 - 1, k % 2, -(k % 2)))
-    np.testing.assert_allclose(lattice.populations, before, rtol=0, atol=ULP / 4)
+    np.testing.assert_allclose(lattice.populations, before, rtol=0, atol=ULP / 2)
     moments = lattice.moments(2)
     for a in range(3):
         np.testing.assert_allclose(moments.velocity[a], stream[a], rtol=0, atol=ULP)
@@ -83,9 +83,9 @@ def amplitude(lattice, shape):
     return (lattice.moments().velocity * shape)[INSIDE].sum() / (shape[INSIDE] ** 2).sum()
 
 
-@pytest.mark.parametrize("name", WAVES)
-def test_viscosity_from_the_decay_of_a_shear_wave(name):
-    viscosity, period, steps = 0.02, 64, 40
+def decay(name, period, steps=40):
+    """Rate at which a shear wave decays, over the exact ν k²."""
+    viscosity = 0.02
     sizes = [period + 2 if n else 10 for n in WAVES[name][0]]
     lattice = Lattice3(*sizes, shear_rate=shear_rate(viscosity), fringe=1)
     shape, k2 = shear_wave(lattice, name, period, viscosity)
@@ -95,8 +95,17 @@ def test_viscosity_from_the_decay_of_a_shear_wave(name):
             wrap(lattice)
             lattice.step()
         amplitudes.append(amplitude(lattice, shape))
-    decay = np.log(amplitudes[0] / amplitudes[1]) / (viscosity * k2 * steps)
-    assert decay == pytest.approx(1, abs=5e-3)
+    return np.log(amplitudes[0] / amplitudes[1]) / (viscosity * k2 * steps)
+
+
+@pytest.mark.parametrize("name", WAVES)
+def test_viscosity_from_the_decay_of_a_shear_wave(name):
+    assert decay(name, 72) == pytest.approx(1, abs=5e-3)
+
+
+def test_viscosity_is_of_second_order():
+    coarse, fine = (abs(decay("x along z", period) - 1) for period in (32, 64))
+    assert np.log2(coarse / fine) == pytest.approx(2, abs=0.2)
 
 
 @pytest.mark.parametrize("stream", [(0.0, 0.0, 0.0), (0.05, -0.02, 0.03)])
@@ -184,18 +193,24 @@ def _layer(n):
 
 
 def test_the_fringe_absorbs_a_pulse_of_sound():
-    """What comes back from a border with a fringe, against one that is the stream at once."""
-    back = {}
+    """The share of its energy that is left when it would have come back to the middle."""
+    left = {}
     for fringe in (1, 12):
         lattice = Lattice3(64, 64, 64, shear_rate=shear_rate(1e-3), fringe=fringe)
         r2 = ((grid(lattice) - 31.5) ** 2).sum(0)
-        zero = np.zeros((3, *r2.shape))
-        lattice.populations[:] = equilibrium(1 + 0.01 * np.exp(-r2 / 18), zero)
-        for _ in range(95):  # to the border and back to the middle, 63 cells at 0.577 a step: 109 steps
+        lattice.populations[:] = equilibrium(1 + 0.01 * np.exp(-r2 / 18), np.zeros((3, *r2.shape)))
+        before = _sound(lattice)
+        for _ in range(120):  # 63 cells at 0.577 a step: 109 steps
             lattice.step()
-        back[fringe] = np.abs(lattice.moments().density[16:48, 16:48, 16:48]).max()
-    assert back[1] > 2e-4  # the pulse, a tenth high by then, is seen where nothing absorbs it
-    assert back[12] < 0.1 * back[1]
+        left[fringe] = _sound(lattice) / before
+    assert left[12] < 1e-3
+    assert left[12] < left[1] / 5
+
+
+def _sound(lattice):
+    """Energy of sound, twice that of its velocity and of its pressure ρ'/3 where ρ is 1."""
+    picture = lattice.moments()
+    return (picture.density.astype(float) ** 2 / 3).sum() + (picture.velocity.astype(float) ** 2).sum()
 
 
 def test_a_flow_uniform_along_z_is_the_flow_in_the_plane():
@@ -246,10 +261,10 @@ def test_taylor_green_vortices_at_a_high_reynolds_number_stay_finite_and_lose_en
 @pytest.mark.parametrize("name", ["y along x", "oblique in a plane"])
 def test_half_the_step_keeps_flow_and_decay_in_physical_time(viscosity, name):
     """Shear of the stress itself: the first steps afterwards already decay at the physical rate."""
-    period = 32
+    period = 48
     sizes = [period + 2 if n else 10 for n in WAVES[name][0]]
     lattice = Lattice3(*sizes, shear_rate=shear_rate(viscosity), stream=(0.1, 0.0, 0.0), fringe=1)
-    shape, k2 = shear_wave(lattice, name, period, viscosity)
+    shape, k2 = shear_wave(lattice, name, period, viscosity, 0.01)  # faster: errors of third order in it
 
     def go_on(steps):
         for _ in range(steps):
@@ -268,4 +283,4 @@ def test_half_the_step_keeps_flow_and_decay_in_physical_time(viscosity, name):
         start = amplitude(lattice, shape)
         go_on(steps)
         rate = np.log(start / amplitude(lattice, shape)) / (viscosity / 2 * k2 * steps)
-        assert rate == pytest.approx(1, abs=0.02)
+        assert rate == pytest.approx(1, abs=0.01)

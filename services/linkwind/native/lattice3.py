@@ -77,7 +77,9 @@ class Lattice3:
         """Fill a window with the stream.
 
         Args:
-            nx, ny, nz: cells along x, y and z; steps are fastest where nx is a multiple of 16.
+            nx: cells along x; steps are fastest where it is a multiple of 16.
+            ny: cells along y.
+            nz: cells along z.
             shear_rate: ω between 0 and 2, see ``linkwind.native.lattice.shear_rate()``.
             stream: velocity of the undisturbed fluid [cells/step], at most 0.3.
             fringe: layers on every side that relax towards the stream, layer k by 0.3 (1 − k/fringe)³ a step.
@@ -101,7 +103,8 @@ class Lattice3:
         self.forced: NDArray[np.uint8] = np.zeros((nz, ny), dtype=np.uint8)
         self._blend = np.zeros(nx, dtype=np.float32)
         first, second = map(address, self._places)
-        rest = (volume, first, second, *map(address, (self.force, self.forced, self._blend)))
+        force, forced, blend = address(self.force), address(self.forced), address(self._blend)
+        rest = (volume, first, second, force, forced, blend)
         self._struct = _Lattice3(nx, ny, nz, fringe, 0.0, (0.0, 0.0, 0.0), *rest)
         self.shear_rate, self.stream = shear_rate, stream
         self.struct_address = ctypes.addressof(self._struct)
@@ -166,7 +169,7 @@ class Lattice3:
         """
         if not all(-1 <= cells <= 1 for cells in shift):
             raise ValueError(f"shift: expected -1, 0 or 1 cells along each axis; got {shift}")
-        self._shift[:] = shift
+        self._shift[:] = list(shift)
         self._step(self.struct_address, self._shift_address)
 
     def moments(self, stride: int = 1) -> Picture3:
