@@ -14,7 +14,7 @@ import numpy as np
 
 from linkwind.native.boundary import Indices, Markers
 from linkwind.scenario.bodies import Body, Joint
-from linkwind.scenario.shapes import Plate
+from linkwind.scenario.shapes import AnyShape, Plate
 from linkwind.spatial import Array
 
 SPACING = 1.1  # cells from marker to marker: with 2 the fluid leaks, below 1 the forces alternate
@@ -73,11 +73,11 @@ def markers(bodies: list[Body], joints: list[Joint], cell: float, viscosity: flo
         chain = [*numbers, numbers[0]] if closed else numbers
         _link(following, chain)
     return _in_order(
-        np.array(carriers, np.int32), np.array(following, np.int32), np.array(places), _joined(bodies, joints)
+        np.array(carriers, np.int32), np.array(following, np.int32), np.array(places), joined(bodies, joints)
     )
 
 
-def _joined(bodies: list[Body], joints: list[Joint]) -> Indices:
+def joined(bodies: list[Body], joints: list[Joint]) -> Indices:
     """Return which bodies may touch, because there is a joint between them, shape (n, n)."""
     pairs = {(joint.parent, joint.child) for joint in joints}
     return np.array(
@@ -131,7 +131,12 @@ def _points(body: Body, cell: float, viscosity: float, hinges: dict[int, str]) -
         low, high = (half if end in hinges else drawn for end in (0, -1))
         count = max(2, 1 + round((low + high) / SPACING))
         return np.column_stack([np.linspace(-low, high, count), np.zeros(count)])
-    return _even(_drawn_in(_fine(shape.outline(720) / cell), inset(OUTLINE_INSET, viscosity)), SPACING)
+    return around(shape, cell, viscosity)
+
+
+def around(shape: AnyShape, cell: float, viscosity: float) -> Array:
+    """Return the markers on a closed outline, drawn in, in the body frame [cells], shape (k, 2)."""
+    return even(_drawn_in(_fine(shape.outline(720) / cell), inset(OUTLINE_INSET, viscosity)), SPACING)
 
 
 def _fine(corners: Array) -> Array:
@@ -155,13 +160,19 @@ def _drawn_in(points: Array, by: float) -> Array:
     return moved[np.array(near) > by - CROSSED]
 
 
-def _even(points: Array, spacing: float) -> Array:
-    """Return points at equal distances of about ``spacing`` along a closed outline."""
+def even(points: Array, spacing: float, least: int = 3) -> Array:
+    """Return points at equal distances of about ``spacing`` along a closed curve, in the plane or in space.
+
+    Args:
+        points: along the curve, shape (k, 2) or (k, 3).
+        spacing: between two of the new ones.
+        least: of them.
+    """
     closed = np.vstack([points, points[:1]])
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
-    count = max(3, round(length[-1] / spacing))
+    count = max(least, round(length[-1] / spacing))
     at = length[-1] * np.arange(count) / count
-    return np.column_stack([np.interp(at, length, closed[:, axis]) for axis in (0, 1)])
+    return np.column_stack([np.interp(at, length, values) for values in closed.T])
 
 
 def _in_order(body: Indices, following: Indices, point: Array, joined: Indices) -> Markers:
