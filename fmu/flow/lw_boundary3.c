@@ -64,20 +64,23 @@ static row streamed(const lw_lattice3 *l, int64_t cell) {
     const float *from = l->populations + cell;
     for (int i = 0; i < 4; ++i) density[i] += (double)from[i];
     for (int a = 0; a < 3; ++a) {
-        const float *plus = from + (1 + 2 * a) * l->volume - step[a], *minus = from + (2 + 2 * a) * l->volume + step[a];
+        const float *plus = from + (1 + 2 * a) * l->volume - step[a];
+        const float *minus = from + (2 + 2 * a) * l->volume + step[a];
         for (int i = 0; i < 4; ++i) {
             density[i] += (double)plus[i] + (double)minus[i];
             momentum[a][i] += (double)plus[i] - (double)minus[i];
         }
     }
     for (int p = 0; p < 3; ++p) {
-        const int64_t sum = step[axes[p][0]] + step[axes[p][1]], difference = step[axes[p][0]] - step[axes[p][1]];
+        const int64_t sum = step[axes[p][0]] + step[axes[p][1]];
+        const int64_t difference = step[axes[p][0]] - step[axes[p][1]];
         const float *of = from + (7 + 4 * p) * l->volume;
         const float *both = of - sum, *none = of + l->volume + sum;
         const float *first = of + 2 * l->volume - difference, *second = of + 3 * l->volume + difference;
         double *one = momentum[axes[p][0]], *other = momentum[axes[p][1]];
         for (int i = 0; i < 4; ++i) {
-            const double alike = (double)both[i] - (double)none[i], unlike = (double)first[i] - (double)second[i];
+            const double alike = (double)both[i] - (double)none[i];
+            const double unlike = (double)first[i] - (double)second[i];
             density[i] += ((double)both[i] + (double)none[i]) + ((double)first[i] + (double)second[i]);
             one[i] += alike + unlike;
             other[i] += alike - unlike;
@@ -125,6 +128,9 @@ static int box_apart(const int32_t *box, const int32_t *low, const int32_t *high
     return 0;
 }
 
+/* The marker at a place of the order, and its cell; and the place after the last one of a block. */
+static int marker_at(const lw_boundary3 *b, int p) { return b->order[p].point; }
+static const int32_t *cell_at(const lw_boundary3 *b, int p) { return b->cell + 3 * marker_at(b, p); }
 static int last_of(const lw_boundary3 *b, int block) {
     const int last = (block + 1) * LW_TILE;
     return last < b->count ? last : b->count;
@@ -132,20 +138,20 @@ static int last_of(const lw_boundary3 *b, int block) {
 
 static void enclose(lw_boundary3 *b, int block) {
     int32_t *box = b->box + 6 * block;
-    for (int k = block * LW_TILE; k < last_of(b, block); ++k)
+    for (int p = block * LW_TILE; p < last_of(b, block); ++p)
         for (int axis = 0; axis < 3; ++axis) {
-            const int32_t at = b->cell[3 * k + axis];
-            if (k == block * LW_TILE || at < box[axis]) box[axis] = at;
-            if (k == block * LW_TILE || at > box[3 + axis]) box[3 + axis] = at;
+            const int32_t at = cell_at(b, p)[axis];
+            if (p == block * LW_TILE || at < box[axis]) box[axis] = at;
+            if (p == block * LW_TILE || at > box[3 + axis]) box[3 + axis] = at;
         }
 }
 
 static int blocks_apart(const lw_boundary3 *b, int i, int j) {
     const int32_t *box = b->box + 6 * i;
     if (box_apart(b->box + 6 * j, box, box + 3)) return 1;
-    for (int k = i * LW_TILE; k < last_of(b, i); ++k)
-        for (int m = j * LW_TILE; m < last_of(b, j); ++m)
-            if (!apart(b->cell + 3 * k, b->cell + 3 * m)) return 0;
+    for (int p = i * LW_TILE; p < last_of(b, i); ++p)
+        for (int q = j * LW_TILE; q < last_of(b, j); ++q)
+            if (!apart(cell_at(b, p), cell_at(b, q))) return 0;
     return 1;
 }
 
@@ -194,39 +200,40 @@ static double mobility(const lw_boundary3 *b, const surroundings *s, int k, int 
     return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }
 
-/* Row k of the matrix, from its diagonal on. Returns -1, or a marker that it must not touch. */
-static int fill_row(lw_boundary3 *b, surroundings *s, int k) {
-    const lw_tiles *e = &b->mobility;
-    const int i = k / LW_TILE;
+/* A row of the matrix, from its diagonal on. Returns -1, or a marker that the row's must not touch. */
+static int fill_row(lw_boundary3 *b, surroundings *s, int p) {
+    const lw_tiles *t = &b->mobility;
+    const int i = p / LW_TILE, k = marker_at(b, p);
     const int32_t *cell = b->cell + 3 * k;
     surround(b, k, s);
-    for (int j = i; j < e->end[i]; ++j) {
-        double *to = lw_tile_at(e, i, j) + k % LW_TILE * LW_TILE;
-        for (int m = 0; m < LW_TILE; ++m) to[m] = 0.0;
+    for (int j = i; j < t->end[i]; ++j) {
+        double *to = lw_tile_at(t, i, j) + p % LW_TILE * LW_TILE;
+        for (int q = 0; q < LW_TILE; ++q) to[q] = 0.0;
         if (box_apart(b->box + 6 * j, cell, cell)) continue;
-        for (int m = j > i ? j * LW_TILE : k; m < last_of(b, j); ++m) {
+        for (int q = j > i ? j * LW_TILE : p; q < last_of(b, j); ++q) {
+            const int m = marker_at(b, q);
             if (apart(cell, b->cell + 3 * m)) continue;
             if (touch(b, k, m)) return m;
-            to[m % LW_TILE] = mobility(b, s, k, m);
+            to[q % LW_TILE] = mobility(b, s, k, m);
         }
     }
-    lw_tile_at(e, i, i)[k % LW_TILE * (LW_TILE + 1)] *= 1.0 + softness;
+    lw_tile_at(t, i, i)[p % LW_TILE * (LW_TILE + 1)] *= 1.0 + softness;
     return -1;
 }
 
 static int factorise(lw_boundary3 *b, int32_t *marker) {
-    const lw_tiles *e = &b->mobility;
+    const lw_tiles *t = &b->mobility;
     surroundings s = {{{{0.0}}}};
-    lay_out(b);
-    for (int k = 0; k < b->count; ++k) {
-        *marker = fill_row(b, &s, k);
+    for (int p = 0; p < b->count; ++p) {
+        *marker = fill_row(b, &s, p);
         if (*marker >= 0) return LW_OVERLAP;
     }
-    for (int k = b->count; k < e->blocks * LW_TILE; ++k) /* none of them there */
-        for (int m = 0; m < LW_TILE; ++m)
-            lw_tile_at(e, k / LW_TILE, k / LW_TILE)[k % LW_TILE * LW_TILE + m] = m == k % LW_TILE;
-    *marker = lw_tiles_factorise(e, 0.1 * softness);
-    return *marker < 0 ? LW_PLACED : LW_OVERLAP;
+    for (int p = b->count; p < t->blocks * LW_TILE; ++p) /* no markers */
+        for (int q = 0; q < LW_TILE; ++q)
+            lw_tile_at(t, p / LW_TILE, p / LW_TILE)[p % LW_TILE * LW_TILE + q] = q == p % LW_TILE;
+    const int bad = lw_tiles_factorise(t, 0.1 * softness);
+    *marker = bad < 0 ? -1 : marker_at(b, bad);
+    return bad < 0 ? LW_PLACED : LW_OVERLAP;
 }
 
 int lw_boundary3_place(lw_boundary3 *b, const lw_lattice3 *l, const double *pose, int32_t *marker) {
@@ -240,12 +247,14 @@ int lw_boundary3_place(lw_boundary3 *b, const lw_lattice3 *l, const double *pose
         weigh(b->at + 3 * k, b->cell + 3 * k, b->weight + LW_STENCIL3 * k);
         sample(b, l, k);
     }
+    lw_order(b->count, b->at, b->order);
+    lay_out(b);
     return factorise(b, marker);
 }
 
 /* ---- forces ---- */
 
-/* The velocity at a marker along each axis by each part of the twist: 1 or a component of the arm, x, y, z, and a
+/* The velocity at a marker along each axis by each part of the twist: 1 or a component x, y, z of the arm, and a
  * sign. */
 typedef struct { int of; double sign; } share;
 static const share by_twist[3][6] = {
@@ -271,20 +280,22 @@ static int width_of(const lw_boundary3 *b) {
 static void fill_columns(lw_boundary3 *b, const double *twist) {
     const int width = width_of(b);
     memset(b->solution, 0, sizeof(double) * (size_t)b->mobility.blocks * LW_TILE * (size_t)width);
-    for (int k = 0; k < b->count; ++k) {
-        double *of = b->solution + (int64_t)k * width;
+    for (int p = 0; p < b->count; ++p) {
+        const int k = marker_at(b, p);
+        double *of = b->solution + (int64_t)p * width;
         of[4 * b->body[k]] = 1.0;
         memcpy(of + 4 * b->body[k] + 1, b->arm + 3 * k, 3 * sizeof(double));
         lw_store3(of + 4 * b->bodies, lacking(b, k, twist));
     }
 }
 
-/* A part of `response` or `wrench` out of products of columns, those of two bodies or of a body and what lacks. */
+/* A part of `response` or `wrench` out of products of columns: of two bodies, or of a body and what lacks. */
 static double response_of(const double *products, int width, int d, int e) {
     double sum = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
         const share one = by_twist[axis][d], other = by_twist[axis][e];
-        if (one.sign != 0.0 && other.sign != 0.0) sum -= one.sign * other.sign * products[one.of * width + other.of];
+        const double sign = one.sign * other.sign;
+        if (sign != 0.0) sum -= sign * products[one.of * width + other.of];
     }
     return sum;
 }
@@ -314,21 +325,26 @@ void lw_boundary3_wrench(lw_boundary3 *b, const double *twist, double *wrench, d
         }
 }
 
-void lw_boundary3_act(lw_boundary3 *b, lw_lattice3 *l, const double *twist) {
+static void spread(const lw_boundary3 *b, lw_lattice3 *l, int k, const double *push) {
     const int64_t window = (int64_t)l->nx * l->ny * l->nz;
+    for (int r = 0; r < LW_ROWS3; ++r) {
+        const int64_t cell = row_of(l, b->cell + 3 * k, r);
+        const double *weight = b->weight + LW_STENCIL3 * k + 4 * r;
+        for (int axis = 0; axis < 3; ++axis) {
+            float *force = l->force + axis * window + cell;
+            for (int i = 0; i < 3; ++i) force[i] += (float)(weight[i] * push[axis]);
+        }
+        l->forced[cell / l->nx] = 1;
+    }
+}
+
+void lw_boundary3_act(lw_boundary3 *b, lw_lattice3 *l, const double *twist) {
     double *x = b->solution;
     memset(x, 0, sizeof(double) * (size_t)b->mobility.blocks * LW_TILE * LW_TILE);
-    for (int k = 0; k < b->count; ++k) lw_store3(x + LW_TILE * k, lacking(b, k, twist));
+    for (int p = 0; p < b->count; ++p) lw_store3(x + LW_TILE * p, lacking(b, marker_at(b, p), twist));
     lw_tiles_forward(&b->mobility, LW_TILE, x);
     lw_tiles_backward(&b->mobility, LW_TILE, x);
-    for (int k = 0; k < b->count; ++k)
-        for (int r = 0; r < LW_ROWS3; ++r) {
-            const int64_t cell = row_of(l, b->cell + 3 * k, r);
-            const double *weight = b->weight + LW_STENCIL3 * k + 4 * r, *of = x + LW_TILE * k;
-            for (int axis = 0; axis < 3; ++axis)
-                for (int i = 0; i < 3; ++i) l->force[axis * window + cell + i] += (float)(weight[i] * of[axis]);
-            l->forced[cell / l->nx] = 1;
-        }
+    for (int p = 0; p < b->count; ++p) spread(b, l, marker_at(b, p), x + LW_TILE * p);
 }
 
 /* Velocity of the fluid at a point of the window, with the forces that act in this step. */

@@ -25,8 +25,6 @@ _TILE = 8  # markers in a block of the matrix, columns that are solved for at on
 class Markers3(NamedTuple):
     """The markers of some bodies in space; their surfaces lie between them.
 
-    A step is fast where markers that are near each other have numbers that are.
-
     Attributes:
         body: that carries each marker, int32, shape (k,).
         point: place in the frame of the body [cells], from the centre of mass, shape (k, 3).
@@ -59,7 +57,7 @@ class _Boundary3(ctypes.Structure):
         *((name, ctypes.c_void_p) for name in ("body", "face", "joined", "point")),
         *(
             (name, ctypes.c_void_p)
-            for name in ("arm", "at", "cell", "box", "weight", "lightness", "velocity")
+            for name in ("arm", "at", "cell", "weight", "lightness", "velocity", "order", "box")
         ),
         ("mobility", _Tiles),
         *((name, ctypes.c_void_p) for name in ("solution", "products")),
@@ -92,10 +90,11 @@ class Boundary3:
             np.zeros((k, 3)),
             self.at,
             np.zeros((k, 3), np.int32),
-            np.zeros((blocks, 6), np.int32),
             _doubles(k * _STENCIL),
             _doubles(k * _STENCIL),
             np.zeros((k, 3)),
+            np.zeros((k, 2)),  # a number and a double each
+            np.zeros((blocks, 6), np.int32),
         ]
         matrix: list[NDArray[Any]] = [
             np.zeros(blocks, np.int32),

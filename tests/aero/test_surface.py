@@ -1,0 +1,176 @@
+"""Where the markers of bodies in space lie: how far apart and drawn in, and at edges that bodies share."""
+
+import numpy as np
+import pytest
+
+from linkwind.aero.flow.nearness import distance
+from linkwind.aero.flow.outline import OUTLINE_INSET, PLATE_INSET, SPACING, inset
+from linkwind.aero.flow.rings import CLOSEST
+from linkwind.aero.flow.surface import surface_markers
+from linkwind.scenario.bodies import Body, Joint
+
+CELL = 0.25
+VISCOSITY = 0.01
+AT_REST = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+FREE, CLOSED = inset(PLATE_INSET, VISCOSITY), inset(OUTLINE_INSET, VISCOSITY)
+
+
+def body(shape, name="body"):
+    return Body(name=name, mass=1.0, inertia=1.0, shape=shape)
+
+
+def plate(chord, span, name="body"):
+    """A plate of a size in cells."""
+    return body({"type": "plate", "length": chord * CELL, "span": span * CELL}, name)
+
+
+def cells(size):
+    return tuple(CELL * length for length in size)
+
+
+def alone(shape):
+    return surface_markers([body(shape)], [], AT_REST[None], CELL, VISCOSITY)
+
+
+def nearest(points):
+    """The distance of each point to the nearest other one."""
+    apart = np.linalg.norm(points[:, None] - points, axis=2)
+    np.fill_diagonal(apart, np.inf)
+    return apart.min(axis=1)
+
+
+def test_a_plate_is_a_grid_drawn_in_at_its_free_edges():
+    markers = surface_markers([plate(24, 60)], [], AT_REST[None], CELL, VISCOSITY)
+    low, high = markers.point.min(axis=0), markers.point.max(axis=0)
+    np.testing.assert_allclose(high, [12 - FREE, 0, 30 - FREE])
+    np.testing.assert_allclose(low, -high)
+    chord, span = (round((size - 2 * FREE) / SPACING) for size in (24, 60))  # patches
+    assert len(markers.body) == (chord + 1) * (span + 1)
+    assert len(markers.face) == chord * span
+    assert np.abs(nearest(markers.point) - SPACING).max() < 0.05
+    sides = markers.point[markers.face] - markers.point[np.roll(markers.face, 1, axis=1)]
+    assert np.linalg.norm(sides, axis=2).max() < SPACING + 0.05  # corners follow each other around the patch
+
+
+def test_a_small_plate_keeps_two_markers_each_way():
+    markers = surface_markers([plate(3, 3)], [], AT_REST[None], CELL, 1e-6)
+    assert inset(PLATE_INSET, 1e-6) > 1.5  # more than there is
+    half = SPACING / 2
+    np.testing.assert_allclose(np.abs(markers.point), np.tile([half, 0, half], (4, 1)))
+
+
+def hinged(parent, child, parent_point, child_point, kind="revolute"):
+    axis = (0.0, 0.0, 1.0)
+    return Joint(
+        name="joint", type=kind, parent=parent.name, child=child.name, axis=axis,
+        parent_point=parent_point, child_point=child_point,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["revolute", "spherical"])
+def test_the_edge_of_a_hinge_is_drawn_in_by_half_the_distance_of_markers(kind):
+    one, two = plate(20, 12, "one"), plate(10, 12, "two")
+    joint = hinged(one, two, (10 * CELL, 0.0, 0.0), (-5 * CELL, 0.0, 0.0), kind)
+    turned = np.array([10 * CELL, 5 * CELL, 0.0, np.cos(np.pi / 4), 0.0, 0.0, np.sin(np.pi / 4)])
+    markers = surface_markers([one, two], [joint], np.array([AT_REST, turned]), CELL, VISCOSITY)
+    first, second = (markers.point[markers.body == k] for k in (0, 1))
+    np.testing.assert_allclose([first[:, 0].min(), first[:, 0].max()], [FREE - 10, 10 - SPACING / 2])
+    np.testing.assert_allclose([second[:, 0].min(), second[:, 0].max()], [SPACING / 2 - 5, 5 - FREE])
+    for point in (first, second):
+        np.testing.assert_allclose(np.abs(point[:, 2]).max(), 6 - FREE)
+    assert np.array_equal(markers.joined, [[0, 1], [1, 0]])
+    apart = surface_markers([one, two], [], np.array([AT_REST, turned]), CELL, VISCOSITY)
+    assert apart.point[apart.body == 0][:, 0].max() == pytest.approx(10 - FREE)  # free without a joint
+
+
+def test_only_that_part_of_an_edge_is_not_free_which_lies_on_the_other_body():
+    """A fin of 8 cells at the end, 20 cells high, of a plate of 40 by 20 cells, which it meets in a line."""
+    hull, fin = plate(40, 20, "hull"), plate(8, 20, "fin")
+    upright = np.array([16 * CELL, 10 * CELL, 10 * CELL, np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0])
+    joint = hinged(hull, fin, (16 * CELL, 0.0, 10 * CELL), (0.0, 0.0, 10 * CELL), "fixed")
+    markers = surface_markers([hull, fin], [joint], np.array([AT_REST, upright]), CELL, VISCOSITY)
+    hull_at, fin_at = (markers.point[markers.body == k] for k in (0, 1))
+    columns = markers.face[0, 3] - markers.face[0, 0]
+    along, _, reached = hull_at.reshape(-1, columns, 3)[-1].T
+    under = (along > 12) & (along < 20)
+    assert 5 < under.sum() < 9
+    np.testing.assert_allclose(reached[under], 10 - SPACING / 2)
+    np.testing.assert_allclose(reached[along < 11], 10 - FREE)
+    np.testing.assert_allclose([fin_at[:, 2].min(), fin_at[:, 2].max()], [FREE - 10, 10 - SPACING / 2])
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        {"type": "circle", "diameter": 12 * CELL, "span": 9 * CELL},
+        {"type": "rectangle", "length": 12 * CELL, "width": 7 * CELL, "span": 20 * CELL},
+    ],
+)
+def test_a_cylinder_is_closed_at_its_ends(shape):
+    markers, span = alone(shape), shape["span"] / CELL
+    level = markers.point[:, 2]
+    assert level.max() == pytest.approx(span / 2 - CLOSED)
+    assert level.min() == -level.max()
+    assert len(np.unique(level)) == 1 + round((span - 2 * CLOSED) / SPACING)
+    deep = np.array([distance(body(shape).shape, CELL * point[None])[0] for point in markers.point])
+    assert not deep.any()  # all are inside
+    spread = nearest(markers.point)
+    assert spread.min() > SPACING / 2**0.5 - 0.01  # around a corner
+    assert spread.max() < 1.2 * SPACING
+    top = markers.point[level == level.max()][:, :2]
+    rng = np.random.default_rng(1)
+    tried = rng.uniform(-1, 1, size=(2000, 2)) * top.max(axis=0)
+    if shape["type"] == "circle":
+        tried = tried[np.hypot(*tried.T) < top.max()]
+    assert max(np.linalg.norm(top - point, axis=1).min() for point in tried) < 1.3  # no holes in the end
+    assert (
+        len(markers.face) == len(np.unique(markers.face)) - (level == level.min())[markers.face[:, 0]].sum()
+    )
+
+
+@pytest.mark.parametrize("size", [(24, 24, 24), (24, 12, 8), (24, 24, 5), (5, 40, 6), (6, 5, 30)])
+def test_markers_of_an_ellipsoid_are_spread_evenly_and_drawn_in_along_its_normals(size):
+    markers, half = alone({"type": "ellipsoid", "size": cells(size)}), np.array(size) / 2
+    points = markers.point
+    spread = nearest(points)
+    assert spread.min() >= CLOSEST - 1e-9
+    assert spread.max() < 1.2 * SPACING
+    assert np.abs(points).max(axis=0) == pytest.approx(half - CLOSED, abs=0.6)
+    fine = _fibonacci(half, 20000)
+    for point in points[:: max(1, len(points) // 50)]:
+        assert np.linalg.norm(fine - point, axis=1).min() == pytest.approx(CLOSED, abs=0.06)
+    area = _area(half - CLOSED)
+    assert len(points) == pytest.approx(area / SPACING**2, rel=0.12)
+
+
+def _fibonacci(half, count):
+    k = np.arange(count) + 0.5
+    z, turn = 1 - 2 * k / count, np.pi * (1 + 5**0.5) * k
+    around = np.sqrt(1 - z * z)
+    return half * np.column_stack([around * np.cos(turn), around * np.sin(turn), z])
+
+
+def _area(half):
+    """K. Thomsen's formula for the area of an ellipsoid, which errs by 1.1 % at most."""
+    p = 1.6075
+    a, b, c = half**p
+    return 4 * np.pi * ((a * b + a * c + b * c) / 3) ** (1 / p)
+
+
+def test_the_triangles_of_a_ball_cover_it():
+    markers = alone({"type": "ellipsoid", "size": cells((24, 24, 24))})
+    corners = markers.point[markers.face]
+    assert np.array_equal(markers.face[:, 2], markers.face[:, 3])
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert np.linalg.norm(across, axis=1).sum() / 2 == pytest.approx(4 * np.pi * (12 - CLOSED) ** 2, rel=0.05)
+
+
+def test_distances_from_shapes():
+    flat = plate(8, 4).shape
+    points = CELL * np.array([[0, 2, 0], [4, 0, 2], [7, 4, 0], [4, 3, 6]])
+    np.testing.assert_allclose(distance(flat, points), CELL * np.array([2, 0, 5, 5]))
+    box = body({"type": "rectangle", "length": 8 * CELL, "width": 4 * CELL, "span": 4 * CELL}).shape
+    points = CELL * np.array([[0, 1, 1], [0, 2.5, 0], [7, 6, 0], [0, 5, 6]])
+    np.testing.assert_allclose(distance(box, points), CELL * np.array([0, 0.5, 5, 5]))
+    ball = body({"type": "ellipsoid", "size": cells((4, 4, 4))}).shape
+    np.testing.assert_allclose(distance(ball, CELL * np.array([[0, 3, 4], [1, 1, 1]])), [3 * CELL, 0])
