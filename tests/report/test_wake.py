@@ -13,7 +13,7 @@ from linkwind.frames import WakeFrame
 from linkwind.log.rings import thinned
 from linkwind.report.data import read
 from linkwind.report.page import render
-from linkwind.report.wake import shown_wakes, survey_wake
+from linkwind.report.wake import shown_times, survey_wake
 from linkwind.report.wakefilm import coded
 from linkwind.report.wakepicture import wake_png
 from linkwind.runs.run import run as fly
@@ -61,7 +61,7 @@ def test_a_survey_has_the_times_and_a_round_scale_that_most_rings_fit(run, frame
     ],
 )
 def test_five_times_are_shown_the_last_one_among_them(t, expected):
-    assert shown_wakes(t).tolist() == expected
+    assert shown_times(t).tolist() == expected
 
 
 def straight(step, rows, wings=2, bound=1, columns=2):

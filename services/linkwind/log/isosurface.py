@@ -82,18 +82,18 @@ def between(values: Single, point: Single) -> Single:
     """Return a field between its grid points, by trilinear interpolation.
 
     Args:
-        values: of the field, shape (layers, rows, columns).
+        values: of the field, shape (layers, rows, columns, …).
         point: where, in cells from the first grid point along z, y, x, shape (n, 3).
 
     Returns:
-        values there, shape (n,).
+        values there, shape (n, …).
     """
-    low = np.clip(np.floor(point).astype(np.int64), 0, np.array(values.shape) - 2)
+    low = np.clip(np.floor(point).astype(np.int64), 0, np.array(values.shape[:3]) - 2)
     share = point - low
-    found = np.zeros(len(point), np.float32)
+    found = np.zeros((len(point), *values.shape[3:]), np.float32)
     for corner in product((0, 1), repeat=3):
         weight = np.where(corner, share, 1.0 - share).prod(axis=1)
-        found += weight * values[tuple((low + corner).T)]
+        found += weight.reshape(-1, *[1] * (values.ndim - 3)) * values[tuple((low + corner).T)]
     return found
 
 

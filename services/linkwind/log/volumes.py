@@ -18,12 +18,13 @@ def picture(payload: bytes) -> bytes:
     """Return a ``SceneUpdate`` of a logged frame: its vortices, on the frame's own scale."""
     frame = logged(VolumeFrame, payload)
     on = scale([frame])
-    point, about, triangle = vortices(frame, on, TRIANGLES)
+    shown = vortices(frame, on, TRIANGLES)
+    share = np.clip(np.nan_to_num(shown.vorticity / on.top), -1.0, 1.0)
     mesh = TriangleListPrimitive(
         pose=ORIGIN,
-        points=[Point3(x=x, y=y, z=z) for x, y, z in point.tolist()],
-        colors=[color(each) for each in np.clip(np.nan_to_num(about / on.top), -1.0, 1.0).tolist()],
-        indices=triangle.ravel().tolist(),
+        points=[Point3(x=x, y=y, z=z) for x, y, z in shown.point.tolist()],
+        colors=[color(each) for each in share.tolist()],
+        indices=shown.triangle.ravel().tolist(),
     )
     stamp = timestamp(frame.time_ns)
     entity = SceneEntity(timestamp=stamp, frame_id="world", id="vortices", triangles=[mesh])

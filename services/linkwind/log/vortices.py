@@ -21,7 +21,7 @@ from linkwind.log.isosurface import Indices, between, isosurface, simplified
 SHARE = 0.6  # of all rotation, the sum of √Q over the cells where Q > 0, that vortices have within
 FAINT = 1e-3  # of the largest speed, by which velocity changes across a cell: not less is rotation
 BINS = np.exp2(np.arange(-160.0, 160.25, 0.25))  # edges, of Q [1/s²]
-CONTRAST = 2.0  # largest vorticity of the scale over the least that the surface of a vortex can have
+CONTRAST = 1.5  # largest vorticity of the scale over the least that the surface of a vortex can have
 
 
 class Scale(NamedTuple):
@@ -29,16 +29,21 @@ class Scale(NamedTuple):
 
     Attributes:
         level: of Q on their surface [1/s²]; infinite where nothing turns.
-        axis: of W about which they turn most, 0 to 2: its vorticity gives the colour.
+        turning: how much they turn about the axes x, y, z of W: the sum of the vorticity's magnitude [1/s].
     """
 
     level: float
-    axis: int
+    turning: tuple[float, float, float]
+
+    @property
+    def axis(self) -> int:
+        """The axis about which they turn most, 0 to 2: the vorticity about it gives the colour."""
+        return self.turning.index(max(self.turning))
 
     @property
     def top(self) -> float:
         """Largest vorticity of the scale [1/s], which reaches as far below 0; ω² is 4 Q and more."""
-        return CONTRAST * 2.0 * math.sqrt(self.level) if math.isfinite(self.level) else 1.0
+        return _rounded(CONTRAST * 2.0 * math.sqrt(self.level)) if math.isfinite(self.level) else 1.0
 
 
 class Vortices(NamedTuple):
@@ -47,11 +52,13 @@ class Vortices(NamedTuple):
     Attributes:
         point: their vertices [m], shape (n, 3), in W.
         vorticity: there, about the axis of the scale [1/s], shape (n,).
+        velocity: of the fluid there [m/s], shape (n, 3), in W.
         triangle: vertices of each, shape (m, 3), counterclockwise as seen from outside.
     """
 
     point: Single
     vorticity: Single
+    velocity: Single
     triangle: Indices
 
 
@@ -77,7 +84,7 @@ def criterion(gradient: Single) -> Single:
 
 
 def scale(frames: Iterable[VolumeFrame]) -> Scale:
-    """Return the level above which ``SHARE`` of the rotation of all frames is, and the main axis of it."""
+    """Return the level above which ``SHARE`` of the rotation of all frames is, and about what they turn."""
     within, about = np.zeros(len(BINS) - 1), np.zeros(3)
     for frame in frames:
         change = gradient(frame)
@@ -87,10 +94,13 @@ def scale(frames: Iterable[VolumeFrame]) -> Scale:
         within += np.histogram(rate * rate, BINS, weights=rate)[0]
         about += np.abs(vorticity(change[turning])).sum(axis=0, dtype=np.float64)
     above = np.cumsum(within[::-1])
-    if not above[-1]:
-        return Scale(math.inf, 2)
     found = int(np.searchsorted(above, SHARE * above[-1]))
-    return Scale(float(BINS[-2 - found]), int(np.argmax(about)))
+    x, y, z = about.tolist()
+    return Scale(_rounded(BINS[-2 - found]) if above[-1] else math.inf, (x, y, z))
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.2g}")
 
 
 def _fastest(frame: VolumeFrame) -> float:
@@ -103,5 +113,6 @@ def vortices(frame: VolumeFrame, scale: Scale, most: int) -> Vortices:
     change = gradient(frame)
     surface = simplified(isosurface(criterion(change), scale.level), most)
     about = between(vorticity(change)[..., scale.axis], surface.point)
+    velocity = between(frame.velocity, surface.point)
     point = np.add(frame.origin, frame.cell * surface.point[:, ::-1]).astype(np.float32)
-    return Vortices(point, about, surface.triangle)
+    return Vortices(point, about, velocity, surface.triangle)

@@ -1,14 +1,15 @@
 """Flow, wakes and bodies of a log for ParaView and its relatives: files of VTK's XML formats, with times.
 
-Frames of a fluid become images (``flow_PROVIDER_0001.vti``, values in cells), wings and their wakes the rings
-on them (``wake_PROVIDER_0001.vtu``, circulation in cells), bodies their outlines in the plane of the flow,
-with the forces on them (``bodies_0001.vtu``); ``*.pvd`` hold them together over time.
+Frames of a fluid become images (``flow_PROVIDER_0001.vti`` in a plane, ``volume_PROVIDER_0001.vti`` in a box,
+values in cells), wings and their wakes the rings on them (``wake_PROVIDER_0001.vtu``, circulation in cells),
+bodies their outlines in their x, y planes, with the forces on them (``bodies_0001.vtu``); ``*.pvd`` hold them
+together over time.
 Bodies are written at the times of the frames, or, without any, at times spread evenly over the run.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,10 +17,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from linkwind.errors import InputError, LogError
-from linkwind.frames import FlowFrame, WakeFrame
+from linkwind.frames import FlowFrame, VolumeFrame, WakeFrame
 from linkwind.log import contents, tables
 from linkwind.log.reader import Log
 from linkwind.log.scenarios import recorded
+from linkwind.log.vortices import criterion, gradient, vorticity
 from linkwind.spatial import Array
 
 STATES = 300  # of the bodies, where there are no frames
@@ -44,7 +46,7 @@ def export_vtk(log: Log, folder: Path) -> list[Path]:
         folder: for the files; is made if it is not there.
 
     Returns:
-        the collections, one for each fluid, for each provider of wakes, and for the bodies.
+        the collections, one for each fluid in a plane or a box, for each provider of wakes, and for the bodies.
 
     Raises:
         InputError: pyevtk is not there.
@@ -59,19 +61,11 @@ def export_vtk(log: Log, folder: Path) -> list[Path]:
             )
         times: list[int] = []
         written = []
-        for provider in log.flows:
-            name = f"flow_{provider}"
+        for name, shown, file in _shown(log):
             found = group(str(folder / name))
-            for number, frame in enumerate(log.frames(provider), 1):
-                found.addFile(_image(hl, folder / f"{name}_{number:04}", frame), frame.time_ns / 1e9)
+            for number, frame in enumerate(shown, 1):
+                found.addFile(file(hl, folder / f"{name}_{number:04}", frame), frame.time_ns / 1e9)
                 times.append(frame.time_ns)
-            written.append(_saved(found, folder / name))
-        for provider in log.wakes:
-            name = f"wake_{provider}"
-            found = group(str(folder / name))
-            for number, wake in enumerate(log.wake_frames(provider), 1):
-                found.addFile(_rings(hl, folder / f"{name}_{number:04}", wake), wake.time_ns / 1e9)
-                times.append(wake.time_ns)
             written.append(_saved(found, folder / name))
         if log.topics.get(contents.STATE):
             found = group(str(folder / "bodies"))
@@ -99,6 +93,17 @@ def _library() -> tuple[Any, Any]:
     return hl, VtkGroup
 
 
+def _shown(log: Log) -> Iterator[tuple[str, Iterator[Any], Callable[[Any, Path, Any], str]]]:
+    """Yield of each provider and kind of frames: a name, the frames, and what writes one to a file."""
+    kinds: tuple[tuple[str, Sequence[str], Any, Any], ...] = (
+        ("flow", log.flows, log.frames, _image),
+        ("volume", log.volumes, log.volume_frames, _box),
+        ("wake", log.wakes, log.wake_frames, _rings),
+    )
+    for kind, providers, frames, file in kinds:
+        yield from ((f"{kind}_{provider}", frames(provider), file) for provider in providers)
+
+
 def _saved(found: Any, path: Path) -> Path:
     found.save()
     return path.with_name(f"{path.name}.pvd")
@@ -118,6 +123,25 @@ def _image(hl: Any, path: Path, frame: FlowFrame) -> str:
     }
     spacing = (frame.cell, frame.cell, frame.cell)
     return str(hl.imageToVTK(str(path), origin=(left, bottom, 0.0), spacing=spacing, cellData=data))
+
+
+def _box(hl: Any, path: Path, frame: VolumeFrame) -> str:
+    change = gradient(frame)
+
+    def cells(values: Any) -> Any:  # x runs first
+        return np.asfortranarray(values.T)
+
+    def vector(values: Any) -> tuple[Any, ...]:
+        return tuple(cells(values[..., axis]) for axis in range(3))
+
+    data = {
+        "velocity [m/s]": vector(frame.velocity),
+        "pressure [Pa]": cells(frame.pressure),
+        "vorticity [1/s]": vector(vorticity(change)),
+        "Q [1/s^2]": cells(criterion(change)),
+    }
+    spacing = (frame.cell, frame.cell, frame.cell)
+    return str(hl.imageToVTK(str(path), origin=frame.extent[0], spacing=spacing, cellData=data))
 
 
 def _rings(hl: Any, path: Path, frame: WakeFrame) -> str:

@@ -21,6 +21,7 @@ from linkwind.log.tables import Trajectory, seconds
 from linkwind.mechanism import build
 from linkwind.mechanism.labels import labels
 from linkwind.report.flow import Flow, survey
+from linkwind.report.volume import Volume, survey_volume
 from linkwind.report.wake import Wake, survey_wake
 from linkwind.scenario import from_json
 from linkwind.scenario.topology import carries
@@ -97,7 +98,8 @@ class Run:
         interface_energy: step size times the power of the wrench on trial minus accepted twist [J],
             shape (m,).
         exchange: wall time of each exchange [s], shape (m,).
-        flows: frames of the fluid on a grid, of each provider that showed any.
+        flows: frames of the fluid in a plane, of each provider that showed any.
+        volumes: frames of the fluid in a box, likewise.
         wakes: frames of wings with their wakes, likewise.
         diagnostics: numbers of each provider that reported any.
         coordinates: of the joints that have one.
@@ -114,6 +116,7 @@ class Run:
     interface_energy: Array
     exchange: Array
     flows: tuple[Flow, ...] = ()
+    volumes: tuple[Volume, ...] = ()
     wakes: tuple[Wake, ...] = ()
     diagnostics: tuple[Diagnostics, ...] = ()
     origin: tuple[str, ...] = ()
@@ -243,6 +246,9 @@ def read(path: Path) -> Run:
         interface_energy=coupling.interface_energy if coupling else np.empty(0),
         exchange=log.timing().exchange_ns / np.float64(1e9) if TIMING in log.topics else np.empty(0),
         flows=tuple(filter(None, (survey(name, partial(log.frames, name)) for name in log.flows))),
+        volumes=tuple(
+            filter(None, (survey_volume(name, partial(log.volume_frames, name)) for name in log.volumes))
+        ),
         wakes=tuple(filter(None, (survey_wake(name, partial(log.wake_frames, name)) for name in log.wakes))),
         diagnostics=tuple(_diagnostics(log)),
         origin=tuple(origin(log)),

@@ -7,9 +7,11 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
+from linkwind.log.vortices import SHARE
 from linkwind.report.data import Run, largest
 from linkwind.report.flow import Flow
 from linkwind.report.tables import number
+from linkwind.report.volume import Volume
 from linkwind.report.wake import Wake
 from linkwind.scenario.providers import BEYOND_DEG, SEPARATES_DEG
 
@@ -20,7 +22,9 @@ SPATIAL = 1000  # Reynolds number from which the wake of a bluff body is far fro
 
 def gallery(run: Run) -> str:
     """Return the pictures of every provider's flow and wakes; nothing for a run without frames."""
-    return "\n".join([*(_flow(run, flow) for flow in run.flows), *(_wake(run, wake) for wake in run.wakes)])
+    flows = [_flow(run, flow) for flow in run.flows]
+    volumes = [part for volume in run.volumes for part in (_vortices(run, volume), _slice(run, volume))]
+    return "\n".join([*flows, *volumes, *(_wake(run, wake) for wake in run.wakes)])
 
 
 def _limits(run: Run, flow: Flow) -> str:
@@ -28,14 +32,19 @@ def _limits(run: Run, flow: Flow) -> str:
     reynolds = _reynolds(run, flow.provider)
     if reynolds is None:
         return ""
-    said = (
-        f" Reynolds number of the longest body and the fastest of wind and bodies: up to {_round(reynolds)}."
-    )
     spatial = (
         f" Above about {_round(SPATIAL)} a real wake is three-dimensional; in two dimensions, as here, "
         "vortices are stronger, and a bluff body has more drag."
     )
-    return said + spatial * (reynolds >= SPATIAL)
+    return _said(reynolds) + spatial * (reynolds >= SPATIAL)
+
+
+def _said(reynolds: float | None) -> str:
+    if reynolds is None:
+        return ""
+    return (
+        f" Reynolds number of the longest body and the fastest of wind and bodies: up to {_round(reynolds)}."
+    )
 
 
 def _attached(run: Run, provider: str) -> str:
@@ -92,6 +101,45 @@ def _flow(run: Run, flow: Flow) -> str:
         f"The log holds {len(flow.t)} frames.{_limits(run, flow)}"
     )
     return _figure("Flow", data, width, height, alternative, caption)
+
+
+def _vortices(run: Run, volume: Volume) -> str:
+    from linkwind.report.volumefilm import AXES
+    from linkwind.report.volumepicture import vortices_png
+
+    drawn = vortices_png(run, volume)
+    if drawn is None:
+        return ""
+    data, width, height, times = drawn
+    when, axis = ", ".join(f"{t:.3f}" for t in times), AXES[volume.scale.axis]
+    about = f"vorticity about {axis}, ±{number(volume.scale.top)} 1/s"
+    bodies = _listed(run.bodies) if len(run.bodies) < 4 else f"{len(run.bodies)} bodies"
+    alternative = f"Surfaces of the vortices around {bodies} at t = {when} s, coloured by {about}."
+    caption = (
+        f"Vortices in the fluid of {volume.provider} at t = {when} s, with {bodies} dark, in perspective "
+        f"from one side, on one scale. On the surfaces Q = {number(volume.scale.level)} 1/s²: inside, the "
+        f"fluid turns by so much more than it strains; this level holds {SHARE:.0%} of all rotation of the "
+        f"run. The colour is the vorticity about {axis}, the axis that most of it is about: red and blue "
+        f"turn opposite ways. The log holds {len(volume.t)} frames.{_said(_reynolds(run, volume.provider))}"
+    )
+    return _figure("Vortices", data, width, height, alternative, caption)
+
+
+def _slice(run: Run, volume: Volume) -> str:
+    from linkwind.report.volumepicture import slice_png
+
+    drawn = slice_png(run, volume)
+    if drawn is None:
+        return ""
+    (data, width, height, times), axis = drawn
+    when, scale = ", ".join(f"{t:.3f}" for t in times), f"0 to {number(volume.speed)} m/s"
+    seen = f"in a plane of constant {axis} through the middle of the mechanism at t = {when} s"
+    alternative = f"Contours of the speed, {scale}, {seen}."
+    caption = (
+        f"Speed of the fluid of {volume.provider} {seen}; dark: the bodies where they are cut. One scale for "
+        "all times; where it ends in a tip, values lie beyond."
+    )
+    return _figure("Speed", data, width, height, alternative, caption)
 
 
 def _wake(run: Run, wake: Wake) -> str:

@@ -79,6 +79,8 @@ def note(run: Run) -> str:
     if not states:
         return "The log holds no state of the mechanism: there is nothing to draw."
     between = "Between two frames of the wakes their lines go straight. " if run.wakes else ""
+    if run.volumes:
+        between += "Between two frames the surfaces of the vortices go with the fluid at their corners. "
     whole = shown_whole(run)
     if states <= min(FRAMES, whole):
         return f"All {states} states are shown. {between}{_ZOOM}"

@@ -21,7 +21,8 @@ from linkwind.report.scene import scene
 from linkwind.report.tables import tables
 
 _ASSETS = files("linkwind.report").joinpath("assets")
-_SCRIPTS = ("clock.js", "charts.js", "motion.js", "film.js", "wake.js", "scene.js", "main.js")
+_SCRIPTS = ("clock.js", "charts.js", "motion.js", "film.js", "reel.js", "wake.js", "vortices.js",
+            "scene.js", "main.js")  # fmt: skip
 
 
 def render(run: Run) -> str:
@@ -73,6 +74,7 @@ def _data(run: Run) -> dict[str, Any]:
         "panels": plots,
         "flow": _film(run) if moving["planar"] else None,
         "wake": _wake(run),
+        "vortices": _vortices(run),
     }
 
 
@@ -92,3 +94,12 @@ def _wake(run: Run) -> dict[str, Any] | None:
     from linkwind.report.wakefilm import wake_film
 
     return wake_film(run.scenario, run.wakes[0])
+
+
+def _vortices(run: Run) -> dict[str, Any] | None:
+    """Return the vortices in the animation, of the first provider that shows its fluid in a box."""
+    if not run.volumes:
+        return None
+    from linkwind.report.volumefilm import volume_film
+
+    return volume_film(run.volumes[0])

@@ -41,8 +41,15 @@ def scene(run: Run) -> dict[str, Any] | None:
 
 
 def flat(run: Run) -> bool:
-    """Tell whether a run is seen straight on: it stays in a plane, and sheds no wakes, which do not."""
-    return run.planar and not any(each["model"] == "vortex" for each in run.scenario.get("providers", ()))
+    """Tell whether a run is seen straight on: it stays in a plane, and its fluid does."""
+    spatial = any(_in_space(provider) for provider in run.scenario.get("providers", ()))
+    return run.planar and not spatial and not run.volumes
+
+
+def _in_space(provider: Mapping[str, Any]) -> bool:
+    """Tell whether a provider's fluid is one of three dimensions."""
+    model = provider["model"]
+    return bool(model == "vortex" or (model == "flow" and provider["flow"].get("dimensions", 2) == 3))
 
 
 def upwards(run: Run) -> tuple[float, float, float]:

@@ -51,7 +51,7 @@ def survey_wake(provider: str, frames: WakeFrames) -> Wake | None:
     return Wake(provider, frames, np.array(times), round_top(np.concatenate(strengths), SHARE))
 
 
-def shown_wakes(t: Array) -> Indices:
+def shown_times(t: Array) -> Indices:
     """Return the indices of the frames that get a picture, ascending.
 
     Args:

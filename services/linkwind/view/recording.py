@@ -14,7 +14,7 @@ import numpy as np
 
 from linkwind.errors import LogError
 from linkwind.log import tables
-from linkwind.log.contents import FLOW, LOG, STATE, STEP, WAKE, WRENCH
+from linkwind.log.contents import FLOW, LOG, STATE, STEP, VOLUME, WAKE, WRENCH
 from linkwind.log.seek import SeekableLog, open_seekable
 from linkwind.report.arrays import pack
 from linkwind.report.data import Diagnostics, Run, coordinates, no_trajectory
@@ -104,6 +104,7 @@ class Recording:
                 "complete": ending.get("complete") == "true" and self.log.trouble is None,
                 "error": self._trouble(),
                 "frames": {provider: self._frames(FLOW + provider) for provider in self.log.flows},
+                "volumes": {provider: self._frames(VOLUME + provider) for provider in self.log.volumes},
                 "wakes": {provider: self._frames(WAKE + provider) for provider in self.log.wakes},
             }
 

@@ -29,6 +29,7 @@ from linkwind.errors import InputError, LinkwindError
 from linkwind.view.console import Console
 from linkwind.view.film import Film
 from linkwind.view.recording import Recording
+from linkwind.view.volumefilm import VolumeFilm
 from linkwind.view.wakefilm import WakeFilm
 
 LOOK, SELDOM = 0.1, 0.5  # s between two looks at a log that grows, and at one that does not
@@ -52,6 +53,7 @@ class Pages:
         self._console = console
         self._films: dict[str, Film] = {}
         self._wakes: dict[str, WakeFilm] = {}
+        self._volumes: dict[str, VolumeFilm] = {}
         self.leaving: Callable[[], bool] = lambda: False
 
     def application(self, hosts: Sequence[str]) -> Starlette:
@@ -73,6 +75,8 @@ class Pages:
                 Route("/picture/{provider}/{quantity}/{index:int}", self._picture),
                 Route("/wake/{provider}", self._wake_reel),
                 Route("/wake/{provider}/{index:int}", self._wake_frame),
+                Route("/vortices/{provider}", self._vortices_reel),
+                Route("/vortices/{provider}/{index:int}", self._vortices_frame),
                 Route("/events", self._events),
                 Route("/steer", self._steer, methods=["POST"]),
                 Mount("/report", StaticFiles(directory=report)),
@@ -117,6 +121,21 @@ class Pages:
 
     def _wake_frame(self, request: Request) -> Response:
         found = self._wake(request).frame(request.path_params["index"])
+        if found is None:
+            raise HTTPException(404, "no such frame")
+        return JSONResponse(found)
+
+    def _vortices(self, request: Request) -> VolumeFilm:
+        provider = request.path_params["provider"]
+        if provider not in self._recording.log.volumes:
+            raise HTTPException(404, f'no fluid in a box of "{provider}" in the log')
+        return self._volumes.setdefault(provider, VolumeFilm(self._recording, provider))
+
+    def _vortices_reel(self, request: Request) -> Response:
+        return JSONResponse(self._vortices(request).reel())
+
+    def _vortices_frame(self, request: Request) -> Response:
+        found = self._vortices(request).frame(request.path_params["index"])
         if found is None:
             raise HTTPException(404, "no such frame")
         return JSONResponse(found)

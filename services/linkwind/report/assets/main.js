@@ -5,6 +5,7 @@ import { makeClock, makeControls, unpack } from "./clock.js";
 import { makeFilm } from "./film.js";
 import { makeMotion } from "./motion.js";
 import { makeScene } from "./scene.js";
+import { makeVortices } from "./vortices.js";
 import { makeWake } from "./wake.js";
 
 // The frames of the data block as the film takes them.
@@ -28,5 +29,6 @@ if (data.scene === null) {
   const scene = makeScene(document.getElementById("scene"), motion, clock);
   if (data.flow) scene.film = makeFilm(flowOf(data.flow), scene.draw);
   if (data.wake) scene.wake = makeWake({ ...data.wake, times: data.wake.t, frame: async (i) => data.wake.frames[i] }, motion, scene.draw);
+  if (data.vortices) scene.vortices = makeVortices({ ...data.vortices, times: data.vortices.t, frame: async (i) => data.vortices.frames[i] }, scene.draw);
   makeCharts(data.panels, clock, document.getElementById("charts"));
 }

@@ -57,6 +57,20 @@ export function makeMotion(scene, times) {
   };
 }
 
+// The middle of the mechanism and of points around it; how far they reach from there along the axes, and at all [m].
+export function around(centre, reach, points) {
+  const low = [...centre], high = [...centre];
+  for (const p of points) for (let k = 0; k < 3; k++) { low[k] = Math.min(low[k], p[k]); high[k] = Math.max(high[k], p[k]); }
+  const size = low.map((x, k) => high[k] - x);
+  const half = (extent) => Math.max(1.35 * reach, 0.5 * extent + 0.45 * reach);
+  return { middle: low.map((x, k) => x + 0.5 * size[k]), side: half(Math.max(...size)), radius: half(Math.hypot(...size)) };
+}
+
+// The box around a box and a room, which may be missing: lowest and highest corner.
+export function joined({ low, high }, room) {
+  return room ? { low: low.map((x, k) => Math.min(x, room[0][k])), high: high.map((x, k) => Math.max(x, room[1][k])) } : { low, high };
+}
+
 // Turns and scales W to the screen. `angle` and `tilt` are the orbit of a 3-D scene.
 export function makeCamera(scene) {
   const camera = { angle: scene.planar ? 0 : -0.6, tilt: scene.planar ? 0 : 0.35, centre: [0, 0, 0], scale: 1, w: 1, h: 1 };

@@ -1,8 +1,8 @@
 // The moving mechanism on a canvas: orthographic, straight on for planar motion, orbited by drag in 3-D.
 
 import { bodyColour, theme } from "./charts.js";
-import { add, length, makeCamera, nice, number, turned } from "./motion.js";
-import { around } from "./wake.js";
+import { add, around, joined, length, makeCamera, nice, number, turned } from "./motion.js";
+import { tips } from "./wake.js";
 
 const GHOSTS = 8; // earlier poses left standing over a whole run
 const WAKE = 4; // sizes of the mechanism that are shown across a flow, and twice as many along it
@@ -22,21 +22,21 @@ function arrow(pen, from, to, head) {
   pen.fill();
 }
 
-// `motion` has the scene and where everything is; `film`, the flow behind it, and `wake` may come later.
+// `motion` has the scene and where everything is; `film`, the flow behind it, `wake` and `vortices` may come later.
 export function makeScene(canvas, motion, clock) {
   const pen = canvas.getContext("2d"), follow = document.getElementById("follow");
   const { scene } = motion, camera = makeCamera(scene);
-  const extent = () => motion.world.high.map((x, k) => x - motion.world.low[k]);
+  const extent = ({ low, high } = motion.world) => high.map((x, k) => x - low[k]);
   follow.checked = length(extent()) > 14 * motion.world.reach;
   const windSpeed = length(scene.wind);
   const look = { zoom: 1, pan: [0, 0, 0] };
-  let colour = theme(), film = null, wake = null;
+  let colour = theme(), film = null, wake = null, vortices = null;
 
-  function aim(now, trailing) {
-    const room = Math.min(camera.w, camera.h), { world } = motion, size = extent();
-    const middle = world.low.map((x, k) => x + size[k] / 2);
+  function aim(now, points) {
+    const room = Math.min(camera.w, camera.h), { world } = motion, all = joined(world, vortices?.room), size = extent(all);
+    const middle = all.low.map((x, k) => x + size[k] / 2);
     if (follow.checked) {
-      const { middle, radius } = around(motion.centre(now), world.reach, trailing);
+      const { middle, radius } = around(motion.centre(now), world.reach, points);
       camera.centre = middle;
       camera.scale = room / (film ? WAKE * world.reach : 2 * radius);
     } else {
@@ -75,6 +75,29 @@ export function makeScene(canvas, motion, clock) {
       pen.fill();
       pen.globalAlpha = 0.8;
       pen.strokeStyle = `rgb(${0.72 * r}, ${0.72 * g}, ${0.72 * b})`;
+      pen.stroke();
+    }
+    pen.globalAlpha = 1;
+  }
+
+  // What faces the eye of the vortices' surfaces, the farthest first.
+  function surfaces({ points, triangles, normals, levels }) {
+    const seen = points.map(camera.project), towards = normals.map((n) => Math.abs(camera.turn(n)[2])), faces = [];
+    for (const [i, j, k] of triangles) {
+      const [a, b, c] = [seen[i], seen[j], seen[k]];
+      if ((b[0] - a[0]) * (a[1] - c[1]) <= (c[0] - a[0]) * (a[1] - b[1])) continue;
+      faces.push([a[2] + b[2] + c[2], [a, b, c], levels[i] + levels[j] + levels[k], towards[i] + towards[j] + towards[k]]);
+    }
+    faces.sort((one, other) => one[0] - other[0]);
+    pen.lineWidth = 0.6;
+    pen.globalAlpha = 0.85;
+    for (const [, corners, level, facing] of faces) {
+      const light = 0.62 + 0.38 * facing / 3, colour = vortices.colour(Math.round(level / 3));
+      pen.fillStyle = pen.strokeStyle = `rgb(${Array.from(colour, (part) => Math.round(light * part)).join(", ")})`;
+      pen.beginPath();
+      for (const [x, y] of corners) pen.lineTo(x, y);
+      pen.closePath();
+      pen.fill();
       pen.stroke();
     }
     pen.globalAlpha = 1;
@@ -249,8 +272,8 @@ export function makeScene(canvas, motion, clock) {
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, camera.w, camera.h);
     pen.font = "12px system-ui, sans-serif";
-    const trailing = wake?.at(t);
-    aim(now, trailing);
+    const trailing = wake?.at(t), turning = vortices?.at(t);
+    aim(now, [...tips(trailing), ...(turning?.points ?? [])]);
     const filmed = film?.draw(pen, camera, t);
     if (scene.planar) grid();
     if (!filmed) streaks(t);
@@ -261,6 +284,7 @@ export function makeScene(canvas, motion, clock) {
       if (then < t) bodies(motion.poses(then), 0.22);
     }
     if (trailing) wakes(trailing);
+    if (turning) surfaces(turning);
     bodies(now, 1, filmed);
     forces(now);
     joints(now, t);
@@ -291,5 +315,5 @@ export function makeScene(canvas, motion, clock) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { colour = theme(); draw(); });
   resize();
   clock.listen(draw);
-  return { draw, look, camera, set film(made) { film = made; }, set wake(made) { wake = made; } };
+  return { draw, look, camera, set film(made) { film = made; }, set wake(made) { wake = made; }, set vortices(made) { vortices = made; } };
 }

@@ -2,10 +2,9 @@
 // where it will be; one that is shed in between leaves the trailing edge in time. Behind the last frame nothing is
 // known but where lines were shed.
 
-import { indexAt } from "./clock.js";
-import { add, number, turned } from "./motion.js";
+import { add, turned } from "./motion.js";
+import { bytesOf, makeReel } from "./reel.js";
 
-const bytesOf = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
 const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 const blend = (a, b, f) => a.map((x, k) => x + f * (b[k] - x));
 
@@ -29,36 +28,16 @@ function decoded(frame, motion, bodies) {
   return { t, bound, columns, wings, kept: shed[0] - shed.at(-1), stride: shed.length > 3 ? shed[1] - shed[2] : 1 };
 }
 
-const AHEAD = 2; // frames that are loaded before they are due
-const BEHIND = 3; // frames before the one that is due, of which one will do until that is there
 const KEPT = 4000; // trailing edges that are remembered
 
-// The middle of the mechanism and of what it trails; how far they reach from there along the axes, and at all [m].
-export function around(centre, reach, wings) {
-  const points = (wings ?? []).flatMap(({ bound, lines }) => lines.slice(bound).flatMap((line) => [line[0], line.at(-1)]));
-  const low = [...centre], high = [...centre];
-  for (const p of points) for (let k = 0; k < 3; k++) { low[k] = Math.min(low[k], p[k]); high[k] = Math.max(high[k], p[k]); }
-  const size = low.map((x, k) => high[k] - x);
-  const half = (extent) => Math.max(1.35 * reach, 0.5 * extent + 0.45 * reach);
-  return { middle: low.map((x, k) => x + 0.5 * size[k]), side: half(Math.max(...size)), radius: half(Math.hypot(...size)) };
-}
+// The tips of all wakes.
+export const tips = (wings) => (wings ?? []).flatMap(({ bound, lines }) => lines.slice(bound).flatMap((line) => [line[0], line.at(-1)]));
 
 // `wakes` has the times, bodies, step, top, colours, and `frame(i)`, which promises a frame.
 export function makeWake(wakes, motion, repaint) {
-  const choice = document.getElementById("wake"), scale = document.getElementById("wake-scale");
-  let palette = null, edges = new Map(), shown = null;
-  const shots = [], coming = new Set();
-
-  // One that is on another scale stays until it is there again.
-  function load(i) {
-    const { top } = wakes;
-    if (i < 0 || i >= wakes.times.length || coming.has(i) || shots[i]?.top === top) return;
-    coming.add(i);
-    wakes.frame(i).then((frame) => {
-      shots[i] = { ...decoded(frame, motion, wakes.bodies), top };
-      repaint();
-    }).catch(() => {}).finally(() => coming.delete(i)); // tried again with the next picture
-  }
+  const named = (source) => ({ ...source, unit: "m²/s" });
+  const reel = makeReel(named(wakes), "wake", (frame) => decoded(frame, motion, wakes.bodies), repaint);
+  let edges = new Map(), shown = null;
 
   // The trailing edge of a wing at the time of a step.
   function trailing(shot, wing, step) {
@@ -93,33 +72,14 @@ export function makeWake(wakes, motion, repaint) {
     });
   }
 
-  function show() {
-    palette ??= bytesOf(wakes.colours);
-    scale.hidden = !choice.checked;
-    const stops = Array.from({ length: 17 }, (_, i) => `rgb(${palette.subarray(3 * Math.round((i * 254) / 16)).slice(0, 3).join(", ")})`);
-    const bar = document.createElement("i");
-    bar.style.background = `linear-gradient(to right, ${stops.join(", ")})`;
-    scale.replaceChildren(`−${number(wakes.top)}`, bar, `${number(wakes.top)} m²/s`);
-    repaint();
-  }
-
-  choice.checked = true;
-  document.getElementById("wake-choice").hidden = false;
-  choice.addEventListener("change", show);
-  requestAnimationFrame(show); // when the scene is there
-
   return {
     // Edges and rows of each wing and its wake, `bound` rows of them on the wing; null without.
     at(t) {
-      const i = indexAt(wakes.times, t + 1e-9);
-      if (!choice.checked || !(wakes.times[i] <= t + 1e-9)) return null;
-      for (let k = i; k <= i + AHEAD; k++) load(k);
-      let last = i;
-      while (last > i - BEHIND && !shots[last]) last--;
-      const shot = shots[last], now = motion.poses(t);
-      if (!shot || !palette) return shown; // until it is there
+      if (!reel.shows(t)) return null;
+      const [shot, next] = reel.around(t), now = motion.poses(t);
+      if (!shot) return shown; // until it is there
       return (shown = wakes.bodies.map((_, wing) => {
-        const wake = wakeAt(shot, shots[last + 1], wing, t);
+        const wake = wakeAt(shot, next, wing, t);
         const own = Array.from({ length: shot.bound + 1 }, (_, edge) => placed(shot, wing, edge, now));
         return {
           bound: shot.bound,
@@ -128,13 +88,8 @@ export function makeWake(wakes, motion, repaint) {
         };
       }));
     },
-    // Red, green, blue of a level of circulation.
-    colour(level) { return palette.subarray(3 * (level + 127), 3 * (level + 127) + 3); },
-    get colours() { return palette; },
-    // Goes on with more frames, which may be on another scale.
-    update(more) {
-      wakes = more;
-      show();
-    },
+    colour: reel.colour,
+    get colours() { return reel.colours; },
+    update: (more) => reel.update(named(more)),
   };
 }

@@ -4,6 +4,7 @@ import { makeCharts, makeKey } from "/report/charts.js";
 import { unpack } from "/report/clock.js";
 import { makeFilm } from "/report/film.js";
 import { makeScene } from "/report/scene.js";
+import { makeVortices } from "/report/vortices.js";
 import { makeWake } from "/report/wake.js";
 import { makeClock } from "./clock.js";
 import { makeHand } from "./hand.js";
@@ -33,7 +34,7 @@ const run = { steered: facts.steered, paused: false, rate: 0 };
 const clock = makeClock(facts.step);
 let now = facts; // what the server told last
 let view = null; // of the recording, once it has a state: poses, scene, charts
-let film = null, frames = 0, wake = null, wakes = 0;
+let film = null, frames = 0, wake = null, wakes = 0, vortices = null, volumes = 0;
 const loaded = { last: null, every: 1, busy: false, again: 0, timer: 0 };
 
 const playbar = makePlaybar(clock, run, () => loaded.every);
@@ -159,6 +160,18 @@ async function trail() {
   else view.scene.wake = wake = makeWake(made, view.poses, view.scene.draw);
 }
 
+// Vortices, of the first provider that shows its fluid in a box.
+async function turn() {
+  const [provider] = Object.keys(now.volumes);
+  if (!provider || view === null || now.volumes[provider] === volumes || !("vortices" in view.scene)) return;
+  volumes = now.volumes[provider];
+  const reel = await ask(`vortices/${provider}`);
+  if (!reel) return;
+  const made = { ...reel, times: reel.t, frame: (i) => ask(`vortices/${provider}/${i}?scale=${reel.top}`) };
+  if (vortices) vortices.update(made);
+  else view.scene.vortices = vortices = makeVortices(made, view.scene.draw);
+}
+
 async function update(news) {
   const { poses, ...rest } = news;
   now = { ...now, ...rest };
@@ -173,9 +186,11 @@ async function update(news) {
   tell();
   const loading = load();
   await trail(); // frames are there sooner than all of the recording
+  await turn();
   await loading;
   await reel();
   await trail();
+  await turn();
 }
 
 tell();

@@ -1,13 +1,13 @@
 // A mechanism in space: solids, joints, forces and the way of the centre of mass, orbited with the mouse.
 
 import { bodyColour, theme } from "/report/charts.js";
-import { add, length, number, turned } from "/report/motion.js";
-import { around } from "/report/wake.js";
+import { add, around, joined, length, number, turned } from "/report/motion.js";
+import { tips } from "/report/wake.js";
 
 const SIDES = 10; // of the head of an arrow
 const ARROW = 0.14; // of the room's side, the longest arrow: it stays in the room wherever it begins
 const FRAME = 30; // ms between two pictures at least
-const LEVELS = 127; // of circulation, above 0
+const LEVELS = 127; // of circulation and vorticity, above 0
 
 // Triangles over closed lines of a body: caps, and sides between the two faces of an outline.
 function facesOf(body) {
@@ -56,16 +56,16 @@ export function makeSpace(host, motion, clock) {
   const bodies = scene.bodies.map((body) => ({ ...facesOf(body), edges: edgesOf(body) }));
   const still = columns(edgesOf({ lines: scene.still }));
   const up = scene.up === "z" ? { x: 0, y: 0, z: 1 } : { x: 0, y: 1, z: 0 };
-  let colour = theme(), drawn = 0, waiting = 0, ready = false, wake = null, coloured = false;
+  let colour = theme(), drawn = 0, waiting = 0, ready = false, wake = null, vortices = null, coloured = false;
 
   const place = (pose, points) => columns(points.map((p) => p && add(pose.at, turned(pose.q, p))));
 
   // The room to look at: a cube, so that lengths are the same along every axis.
-  function room(now, wings) {
-    const { low, high, reach } = motion.world;
-    const near = around(motion.centre(now), 1.04 * reach, wings);
+  function room(now, points) {
+    const { low, high } = joined(motion.world, vortices?.room);
+    const near = around(motion.centre(now), 1.04 * motion.world.reach, points);
     const middle = follow.checked ? near.middle : low.map((x, k) => (x + high[k]) / 2);
-    const half = follow.checked ? near.side : 0.7 * Math.max(...high.map((x, k) => x - low[k]), 1e-9);
+    const half = follow.checked ? near.side : (vortices?.room ? 0.56 : 0.7) * Math.max(...high.map((x, k) => x - low[k]), 1e-9);
     return middle.map((x) => [x - half, x + half]);
   }
 
@@ -103,22 +103,23 @@ export function makeSpace(host, motion, clock) {
 
   // What changes with time, trace by trace.
   function frame(t) {
-    const now = motion.poses(t), wings = wake?.at(t), ranges = room(now, wings), metres = ranges[0][1] - ranges[0][0];
+    const now = motion.poses(t), wings = wake?.at(t), turning = vortices?.at(t) ?? { points: [], triangles: [], levels: [] };
+    const ranges = room(now, [...tips(wings), ...turning.points]), metres = ranges[0][1] - ranges[0][0];
     const { lines, heads } = arrows(now, metres);
     const held = scene.joints.filter(({ until }) => until == null || t <= until);
     const joints = held.map(({ body, point }) => add(now[body].at, turned(now[body].q, point)));
     const path = motion.path.filter((_, i) => motion.times[i] <= t);
     const sheet = sheets(wings);
     return {
-      ranges, sheet,
+      ranges, sheet, turning,
       points: [
         ...bodies.flatMap(({ points, edges }, b) => [place(now[b], points), place(now[b], edges)]),
-        columns(joints), columns(lines), columns(heads), columns(path), still, columns(sheet.points), columns(sheet.lines),
+        columns(joints), columns(lines), columns(heads), columns(path), still, columns(sheet.points), columns(sheet.lines), columns(turning.points),
       ],
     };
   }
 
-  function traces(points, { triangles, levels }) {
+  function traces(points, { triangles, levels }, turning) {
     const [i, j, k] = [0, 1, 2].map((corner) => (faces) => faces.map((face) => face[corner]));
     const at = ([x, y, z]) => ({ x, y, z, hoverinfo: "skip" });
     const ring = scene.bodies.flatMap((_, b) => Array.from({ length: SIDES }, (_, s) => {
@@ -133,7 +134,7 @@ export function makeSpace(host, motion, clock) {
         { type: "scatter3d", mode: "lines", ...at(points[2 * b + 1]), line: { color: own, width: 4 } },
       ];
     });
-    const [joints, lines, heads, path, surroundings, rings, edges] = points.slice(2 * bodies.length);
+    const [joints, lines, heads, path, surroundings, rings, edges, eddies] = points.slice(2 * bodies.length);
     return [
       ...made,
       { type: "scatter3d", mode: "markers", ...at(joints), marker: { size: 5, color: colour("card"), line: { color: colour("ink"), width: 2 } } },
@@ -147,13 +148,19 @@ export function makeSpace(host, motion, clock) {
         lighting: { ambient: 0.9, diffuse: 0.3, specular: 0, roughness: 1 },
       },
       { type: "scatter3d", mode: "lines", ...at(edges), line: { color: colour("soft"), width: 1 }, opacity: 0.35 },
+      {
+        type: "mesh3d", ...at(eddies), i: i(turning.triangles), j: j(turning.triangles), k: k(turning.triangles),
+        intensity: turning.levels, intensitymode: "vertex", cmin: -LEVELS, cmax: LEVELS, colorscale: scale(), showscale: false,
+        opacity: 0.85, flatshading: false, lighting: { ambient: 0.7, diffuse: 0.5, specular: 0.05, roughness: 0.9 },
+      },
     ];
   }
 
-  // The colours of circulation, from the most negative.
+  // The colours of circulation and of vorticity, the same, from the most negative.
   function scale() {
+    const of = [wake, vortices].find((shown) => shown?.colours);
     return Array.from({ length: 33 }, (_, i) => {
-      const [r, g, b] = wake?.colours ? wake.colour(Math.round((i / 16 - 1) * LEVELS)) : [128, 128, 128];
+      const [r, g, b] = of ? of.colour(Math.round((i / 16 - 1) * LEVELS)) : [128, 128, 128];
       return [i / 32, `rgb(${r}, ${g}, ${b})`];
     });
   }
@@ -191,11 +198,14 @@ export function makeSpace(host, motion, clock) {
 
   async function paint() {
     if (!ready) return;
-    const { ranges, points, sheet } = frame(clock.t), rings = points.length - 2;
-    if (coloured !== !!wake?.colours) { coloured = !coloured; await Plotly.restyle(host, { colorscale: [scale()] }, [rings]); }
-    const at = (k) => points.map((each) => each[k]);
-    const corner = (k) => points.map((_, n) => (n === rings ? sheet.triangles.map((each) => each[k]) : undefined));
-    const intensity = points.map((_, n) => (n === rings ? sheet.levels : undefined));
+    const { ranges, points, sheet, turning } = frame(clock.t), rings = points.length - 3, eddies = points.length - 1;
+    if (!coloured && (wake?.colours || vortices?.colours)) {
+      coloured = true;
+      await Plotly.restyle(host, { colorscale: [scale()] }, [rings, eddies]);
+    }
+    const at = (k) => points.map((each) => each[k]), meshes = { [rings]: sheet, [eddies]: turning };
+    const corner = (k) => points.map((_, n) => meshes[n]?.triangles.map((each) => each[k]));
+    const intensity = points.map((_, n) => meshes[n]?.levels);
     const [x, y, z] = ["xaxis", "yaxis", "zaxis"].map((name, k) => [`scene.${name}.range`, ranges[k]]);
     drawn = performance.now();
     await Plotly.update(host, { x: at(0), y: at(1), z: at(2), i: corner(0), j: corner(1), k: corner(2), intensity }, { ...Object.fromEntries([x, y, z]), annotations: words() });
@@ -209,14 +219,14 @@ export function makeSpace(host, motion, clock) {
 
   function dress() {
     colour = theme();
-    const { ranges, points, sheet } = frame(clock.t);
+    const { ranges, points, sheet, turning } = frame(clock.t);
     const config = { displayModeBar: false, responsive: true, scrollZoom: true };
-    Plotly.react(host, traces(points, sheet), layout(ranges), config).then(() => { ready = true; });
+    Plotly.react(host, traces(points, sheet, turning), layout(ranges), config).then(() => { ready = true; });
   }
 
   dress();
   clock.listen(draw);
   follow.addEventListener("change", draw);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", dress);
-  return { draw, set wake(made) { wake = made; } };
+  return { draw, set wake(made) { wake = made; }, set vortices(made) { vortices = made; } };
 }
