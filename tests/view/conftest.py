@@ -5,6 +5,7 @@ from linkwind.runs.run import run
 from linkwind.scenario import load
 from tests.flows import VortexModel
 from tests.report.chromium import PROGRAM, Chromium
+from tests.volumes import VolumeModel
 
 SPINNER = """
 name = "spinner"
@@ -36,7 +37,7 @@ WAKES = [
 
 @pytest.fixture(scope="package")
 def logs(tmp_path_factory):
-    """Logs by name: planar, with a flow, in space, with wakes, cut."""
+    """Logs by name: planar, with a flow, in space, with wakes, with fluid in a box, cut."""
     folder = tmp_path_factory.mktemp("logs")
     here = ["bus.transport=inprocess"]
 
@@ -52,6 +53,8 @@ def logs(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(aero.MODELS, "none", lambda scenario, provider: VortexModel(every=10))
         made["flow"] = log("flow", "two_link", [*here, "time.end=0.05", "aero.model=none"])
+        patch.setitem(aero.MODELS, "none", lambda scenario, provider: VolumeModel(every=20))
+        made["volumes"] = log("volumes", str(folder / "spinner.toml"), ["time.end=0.06", "aero.model=none"])
     (folder / "cut").mkdir()
     made["cut"] = folder / "cut" / "log.mcap"
     made["cut"].write_bytes(made["planar"].read_bytes()[:-200_000])

@@ -23,7 +23,7 @@ def leaves(node):
     return leaves(node["first"]) + leaves(node["second"])
 
 
-@pytest.mark.parametrize("name", ["planar", "flow", "space", "wakes"])
+@pytest.mark.parametrize("name", ["planar", "flow", "space", "wakes", "volumes"])
 def test_the_importer_takes_it(logs, name):
     made = json.loads(json.dumps(layout(open_recording(logs[name]))))
     assert all(isinstance(made[key], dict) for key in ("configById", "globalVariables", "userNodes"))
@@ -32,7 +32,7 @@ def test_the_importer_takes_it(logs, name):
     assert {panel.split("!")[0] for panel in made["configById"]} == {"3D", "Plot"}
 
 
-@pytest.mark.parametrize("name", ["planar", "flow", "space", "wakes"])
+@pytest.mark.parametrize("name", ["planar", "flow", "space", "wakes", "volumes"])
 def test_the_log_has_what_it_shows(logs, name):
     log = open_log(logs[name])
     made = layout(open_recording(logs[name]))["configById"]
@@ -41,7 +41,8 @@ def test_the_log_has_what_it_shows(logs, name):
     assert scene["followTf"] in log.bodies
     assert ("/flow/aero" in scene["topics"]) == (name == "flow")
     assert ("/scene/wake/aero" in scene["topics"]) == (name == "wakes")
-    assert scene["cameraState"]["perspective"] == (name in ("space", "wakes"))
+    assert ("/scene/volume/aero" in scene["topics"]) == (name == "volumes")
+    assert scene["cameraState"]["perspective"] == (name in ("space", "wakes", "volumes"))
     columns = log.columns("/state")
     curves = [curve["value"] for panel in made.values() for curve in panel.get("paths", ())]
     assert len(curves) > 4

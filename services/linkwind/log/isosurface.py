@@ -71,6 +71,7 @@ def simplified(surface: Surface, most: int) -> Surface:
 def _clustered(surface: Surface, side: float) -> Surface:
     cell = np.floor(surface.point / side).astype(np.int64)
     _, number, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+    number = number.ravel()
     point = np.stack([np.bincount(number, axis) for axis in surface.point.T], axis=1) / count[:, None]
     triangle = number[surface.triangle]
     a, b, c = triangle.T

@@ -88,9 +88,9 @@ def scale(frames: Iterable[VolumeFrame]) -> Scale:
     within, about = np.zeros(len(BINS) - 1), np.zeros(3)
     for frame in frames:
         change = gradient(frame)
-        q, least = criterion(change), FAINT * _fastest(frame) / frame.cell
-        turning = (q > least * least) & (q < BINS[-1])
-        rate = np.sqrt(q[turning].astype(np.float64))
+        q = criterion(change).astype(np.float64)
+        turning = (q > (FAINT * _fastest(frame) / frame.cell) ** 2) & (q < BINS[-1])
+        rate = np.sqrt(q[turning])
         within += np.histogram(rate * rate, BINS, weights=rate)[0]
         about += np.abs(vorticity(change[turning])).sum(axis=0, dtype=np.float64)
     above = np.cumsum(within[::-1])

@@ -46,7 +46,7 @@ def export_vtk(log: Log, folder: Path) -> list[Path]:
         folder: for the files; is made if it is not there.
 
     Returns:
-        the collections, one for each fluid in a plane or a box, for each provider of wakes, and for the bodies.
+        the collections, one for each fluid, for each provider of wakes, and for the bodies.
 
     Raises:
         InputError: pyevtk is not there.
