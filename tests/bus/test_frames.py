@@ -10,16 +10,17 @@ from linkwind.bus.base import DynamicsLink
 from linkwind.bus.inprocess import InProcessLink
 from linkwind.bus.zenoh import ZenohDynamicsLink, loopback_endpoint
 from linkwind.errors import ProtocolError
-from linkwind.frames import FlowFrame
+from linkwind.frames import FlowFrame, Frame
 from linkwind.protocol import DynamicsSession, ProviderSession
 from tests.bus.test_zenoh import Provider, finish, session
 from tests.flows import VortexModel, equal, vortices
+from tests.volumes import VolumeModel, hill
 
 STEP_NS = 1_000_000
 LARGE = {"rows": 224, "columns": 256}  # 0.9 MB
 
 
-def march(d: DynamicsSession, link: DynamicsLink) -> list[list[tuple[str, FlowFrame]]]:
+def march(d: DynamicsSession, link: DynamicsLink) -> list[list[tuple[str, Frame]]]:
     """Do ten steps; return the frames that were there after the answers of each, and after the Byes."""
     came = []
 
@@ -37,7 +38,7 @@ def march(d: DynamicsSession, link: DynamicsLink) -> list[list[tuple[str, FlowFr
     return came
 
 
-def check(came: list[list[tuple[str, FlowFrame]]], every: dict[str, int]) -> None:
+def check(came: list[list[tuple[str, Frame]]], every: dict[str, int]) -> None:
     """The frame of t_k comes with the answer to k + 1, which commits it; the last one with the Bye."""
     for exchange, frames in enumerate(came):
         k = max(0, exchange - 1)
@@ -69,6 +70,23 @@ def model(every: int) -> Callable[[str, str], VortexModel]:
 def test_the_same_in_one_process(every: dict[str, int]) -> None:
     d = session(*every)
     check(march(d, InProcessLink(d, [ProviderSession(name, model(n)) for name, n in every.items()])), every)
+
+
+def test_a_box_of_a_quarter_of_a_million_cells_comes_over_the_bus() -> None:
+    large = {"size": (60, 62, 67), "cell": 0.02}
+    endpoint, d = loopback_endpoint(), session()
+    link = ZenohDynamicsLink(d, [endpoint], [], 5.0)
+    try:
+        provider = Provider(endpoint, VolumeModel(every=5, **large), "aero")
+        assert link.wait(lambda: not d.not_ready, 10.0, lambda: None)
+        came = [frame for frames in march(d, link) for _, frame in frames]
+    finally:
+        link.close()
+    provider.join(10.0)
+    assert provider.error is None
+    assert [frame.step for frame in came] == [0, 5, 10]
+    assert all(f.encode() == hill(f.step * 1e-3, STEP_NS, **large).encode() for f in came)
+    assert 3.98e6 < len(came[0].encode()) < 4.0e6
 
 
 def test_a_frame_that_cannot_be_sent_ends_the_run() -> None:
