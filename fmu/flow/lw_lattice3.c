@@ -6,7 +6,8 @@
 
 enum {
     ROWS = 16, /* in one part of the job */
-    LANES = 16 /* rows are worked on from and up to multiples of it: no remainders, aligned writes */
+    LANES = 16, /* rows are worked on from and up to multiples of it: no remainders, aligned writes */
+    AHEAD = 96  /* cells from those in work to those that memory is asked for */
 };
 
 /* What is read and what is written for a row do not overlap; the compiler cannot check it for 38 pointers. */
@@ -29,6 +30,7 @@ typedef struct {
     int32_t shift[3];
     int32_t begin, end; /* columns that have a source */
     int32_t down;       /* rows come from the last to the first */
+    int64_t upstream[LW_DIRECTIONS3]; /* from a cell of the first volume to what streams into it */
     float stream[LW_DIRECTIONS3];
 } step_job;
 
@@ -129,29 +131,44 @@ static const int8_t velocity[LW_DIRECTIONS3][3] = {
     {-1, 0, 1}, {0, 1, 1},   {0, -1, -1}, {0, 1, -1}, {0, -1, 1},
 };
 
-/* Pull the populations of the columns from `begin` to `end` of a row, collide, and write them. `source` and `to`
- * are where the row begins in the old window and in the new one. */
-LW_INLINE void collide_row(const step_job *job, int64_t source, int64_t to, int32_t begin, int32_t end,
-                           int forced) {
-    const lw_lattice3 *lattice = job->lattice;
-    const int64_t nx = lattice->nx, slab = nx * lattice->ny, cells = slab * lattice->nz;
-    const float *in[LW_DIRECTIONS3];
+LW_INLINE int32_t smaller(int32_t a, int32_t b) { return a < b ? a : b; }
+LW_INLINE int32_t larger(int32_t a, int32_t b) { return a > b ? a : b; }
+
+/* Up and down to whole vectors, within a row. */
+LW_INLINE int32_t up(int32_t i, int32_t nx) { return smaller(nx, (i + LANES - 1) / LANES * LANES); }
+LW_INLINE int32_t down(int32_t i) { return i - i % LANES; }
+
+/* A row on its way from the old window to the new one. */
+typedef struct {
+    const float *in[LW_DIRECTIONS3]; /* what streams into its first cell */
     float *out[LW_DIRECTIONS3];
+    const float *force[3];
+} passage;
+
+/* A collision is as long as what the processor looks ahead: it would wait for memory in each. */
+LW_INLINE void prefetch(const passage *row, int64_t i) {
+#if defined(__GNUC__)
     for (int q = 0; q < LW_DIRECTIONS3; ++q) {
-        const int8_t *c = velocity[q];
-        in[q] = lattice->populations + q * lattice->volume + source - c[0] - c[1] * nx - c[2] * slab;
-        out[q] = lattice->next + q * lattice->volume + to;
+        __builtin_prefetch(row->in[q] + i);
     }
-    const float *fx = lattice->force + source, *fy = fx + cells, *fz = fy + cells;
-    const float keep = 1.0f - lattice->shear_rate;
+#else
+    (void)row, (void)i;
+#endif
+}
+
+/* Pull the populations of at most LANES cells, collide, and write them. */
+LW_INLINE void collide_cells(const passage *row, int32_t begin, int32_t end, float keep, int forced) {
+    const float *const *in = row->in, *const *force = row->force;
+    float *const *out = row->out;
     LW_INDEPENDENT
     for (int64_t i = begin; i < end; ++i) {
         const cell pulled = {in[0][i], in[1][i], in[2][i], in[3][i], in[4][i], in[5][i], in[6][i],
                              {in[7][i], in[8][i], in[9][i], in[10][i]},
                              {in[11][i], in[12][i], in[13][i], in[14][i]},
                              {in[15][i], in[16][i], in[17][i], in[18][i]}};
-        const vector force = {forced ? fx[i] : 0.0f, forced ? fy[i] : 0.0f, forced ? fz[i] : 0.0f};
-        const cell f = collide(pulled, keep, force, forced);
+        const vector push = {forced ? force[0][i] : 0.0f, forced ? force[1][i] : 0.0f,
+                             forced ? force[2][i] : 0.0f};
+        const cell f = collide(pulled, keep, push, forced);
         out[0][i] = f.rest;
         out[1][i] = f.px;
         out[2][i] = f.mx;
@@ -174,72 +191,81 @@ LW_INLINE void collide_row(const step_job *job, int64_t source, int64_t to, int3
     }
 }
 
+/* A row without its end cells, from its last cells to the first where the rows come so: the processor expects the
+ * memory to go on as it came. Rounded to whole vectors, some cells are computed from what happens to lie beside
+ * the source's row, and are overwritten. */
+LW_INLINE void collide_row(const step_job *job, const passage *row, int forced) {
+    const int32_t begin = down(job->begin), end = up(job->end, job->lattice->nx);
+    const int32_t vectors = (end - begin + LANES - 1) / LANES, ahead = job->down ? -AHEAD : AHEAD;
+    const float keep = 1.0f - job->lattice->shear_rate;
+    for (int32_t k = 0; k < vectors; ++k) {
+        const int32_t i = begin + LANES * (job->down ? vectors - 1 - k : k);
+        prefetch(row, i + ahead);
+        collide_cells(row, i, smaller(i + LANES, end), keep, forced);
+    }
+}
+
 /* Relax columns towards the stream. Where fringes overlap, one follows the other. */
-LW_INLINE void relax(const step_job *job, int64_t to, int32_t begin, int32_t end, float of_row) {
-    const lw_lattice3 *lattice = job->lattice;
-    const float *blend = lattice->blend;
+LW_INLINE void relax(const step_job *job, const passage *row, int32_t begin, int32_t end, float of_row) {
+    const float *blend = job->lattice->blend;
     for (int q = 0; q < LW_DIRECTIONS3; ++q) {
-        float *row = lattice->next + q * lattice->volume + to;
+        float *out = row->out[q];
         const float stream = job->stream[q];
         LW_INDEPENDENT
         for (int32_t i = begin; i < end; ++i) {
-            row[i] += (blend[i] + of_row * (1.0f - blend[i])) * (stream - row[i]);
+            out[i] += (blend[i] + of_row * (1.0f - blend[i])) * (stream - out[i]);
         }
     }
 }
 
-LW_INLINE void fill(const step_job *job, int64_t to, int32_t begin, int32_t end) {
+LW_INLINE void fill(const step_job *job, const passage *row, int32_t begin, int32_t end) {
     for (int q = 0; q < LW_DIRECTIONS3; ++q) {
-        float *row = job->lattice->next + q * job->lattice->volume + to;
         for (int32_t i = begin; i < end; ++i) {
-            row[i] = job->stream[q];
+            row->out[q][i] = job->stream[q];
         }
     }
 }
-
-LW_INLINE int32_t smaller(int32_t a, int32_t b) { return a < b ? a : b; }
-LW_INLINE int32_t larger(int32_t a, int32_t b) { return a > b ? a : b; }
-
-/* Up to whole vectors, within a row. */
-LW_INLINE int32_t rounded(int32_t end, int32_t nx) { return smaller(nx, (end + LANES - 1) / LANES * LANES); }
 
 LW_INLINE int outermost(int32_t at, int32_t n) { return at < 1 || at > n - 2; }
 
-/* A row from the old window to the new one. Rounded to whole vectors, some cells are computed from what
- * happens to lie beside the source's row, and are overwritten. */
-LW_INLINE void advance_row(const step_job *job, int32_t row) {
+LW_INLINE void advance_row(const step_job *job, int32_t number) {
     const lw_lattice3 *lattice = job->lattice;
-    const int32_t nx = lattice->nx, ny = lattice->ny, nz = lattice->nz, j = row % ny, k = row / ny;
+    const int32_t nx = lattice->nx, ny = lattice->ny, nz = lattice->nz, j = number % ny, k = number / ny;
     const int32_t from_j = j + job->shift[1], from_k = k + job->shift[2];
-    const int64_t to = (int64_t)row * nx, from = (int64_t)from_k * ny + from_j;
+    const int64_t from = (int64_t)from_k * ny + from_j, source = from * nx + job->shift[0];
+    passage row;
+    for (int q = 0; q < LW_DIRECTIONS3; ++q) {
+        row.in[q] = lattice->populations + job->upstream[q] + source;
+        row.out[q] = lattice->next + q * lattice->volume + (int64_t)number * nx;
+    }
     if (outermost(j, ny) || outermost(k, nz) || outermost(from_j, ny) || outermost(from_k, nz)) {
-        fill(job, to, 0, nx);
+        fill(job, &row, 0, nx);
         return;
     }
-    const int32_t begin = job->begin - job->begin % LANES, end = rounded(job->end, nx);
+    for (int a = 0; a < 3; ++a) {
+        row.force[a] = lattice->force + source + a * ((int64_t)nx * ny * nz);
+    }
     if (lattice->forced[from]) {
-        collide_row(job, from * nx + job->shift[0], to, begin, end, 1);
+        collide_row(job, &row, 1);
     } else {
-        collide_row(job, from * nx + job->shift[0], to, begin, end, 0);
+        collide_row(job, &row, 0);
     }
     const float of_j = lw_lattice3_blend(lattice, smaller(j, ny - 1 - j));
     const float of_k = lw_lattice3_blend(lattice, smaller(k, nz - 1 - k));
-    const float of_row = of_j + of_k * (1.0f - of_j);
-    if (of_row > 0.0f) {
-        relax(job, to, 0, nx, of_row);
+    if (of_j > 0.0f || of_k > 0.0f) {
+        relax(job, &row, 0, nx, of_j + of_k * (1.0f - of_j));
     } else {
-        const int32_t inner = nx - lattice->fringe;
-        relax(job, to, 0, rounded(lattice->fringe, nx), 0.0f);
-        relax(job, to, inner - inner % LANES, nx, 0.0f);
+        relax(job, &row, 0, up(lattice->fringe, nx), 0.0f);
+        relax(job, &row, down(nx - lattice->fringe), nx, 0.0f);
     }
-    fill(job, to, 0, job->begin);
-    fill(job, to, job->end, nx);
+    fill(job, &row, 0, job->begin);
+    fill(job, &row, job->end, nx);
 }
 
 LW_INLINE void advance_rows(const step_job *step, int32_t part) {
     const int32_t rows = step->lattice->ny * step->lattice->nz, end = smaller(rows, (part + 1) * ROWS);
-    for (int32_t row = part * ROWS; row < end; ++row) {
-        advance_row(step, step->down ? rows - 1 - row : row);
+    for (int32_t k = part * ROWS; k < end; ++k) {
+        advance_row(step, step->down ? rows - 1 - k : k);
     }
 }
 
@@ -287,6 +313,10 @@ void lw_lattice3_step(lw_lattice3 *lattice, const int32_t shift[3]) {
     job.begin = larger(1, 1 - shift[0]);
     job.end = smaller(nx - 1, nx - 1 - shift[0]);
     job.down = lattice->next > lattice->populations;
+    for (int q = 0; q < LW_DIRECTIONS3; ++q) {
+        const int8_t *c = velocity[q];
+        job.upstream[q] = q * lattice->volume - c[0] - nx * (c[1] + (int64_t)lattice->ny * c[2]);
+    }
     lw_lattice3_stream(lattice, job.stream);
     lw_threads_run(lattice->threads, advance_part, &job, (rows + ROWS - 1) / ROWS);
     float *const done = lattice->next;
