@@ -201,7 +201,11 @@ LW_INLINE void collide_row(const step_job *job, const passage *row, int forced) 
     for (int32_t k = 0; k < vectors; ++k) {
         const int32_t i = begin + LANES * (job->down ? vectors - 1 - k : k);
         prefetch(row, i + ahead);
-        collide_cells(row, i, smaller(i + LANES, end), keep, forced);
+        if (i + LANES <= end) { /* a number of cells that the compiler knows */
+            collide_cells(row, i, i + LANES, keep, forced);
+        } else {
+            collide_cells(row, i, end, keep, forced);
+        }
     }
 }
 
