@@ -14,8 +14,6 @@
 #include "lw_order.h"
 #include "lw_tiles.h"
 
-enum { LW_ROWS3 = 9, LW_STENCIL3 = 4 * LW_ROWS3 }; /* rows along x, a fourth cell without weight */
-
 typedef struct {
     int32_t bodies, count, faces;
     const int32_t *body;   /* (count) that carries a marker */
@@ -26,11 +24,13 @@ typedef struct {
     double *arm;           /* (count,3) from the centre of mass of the body, in world axes [cells] */
     double *at;            /* (count,3) in the window [cells]: the centre of cell (i, j, k) is at (i, j, k) */
     int32_t *cell;         /* (count,3) of the middle of the 3 x 3 x 3 cells */
-    double *weight;        /* (count,9,4) of these cells, rows along x */
+    double *weight;        /* (count,9,4) of these cells, in rows of lw_stencil3.h */
     double *lightness;     /* (count,9,4) 1 / (2 density) of the fluid there */
     double *velocity;      /* (count,3) of the fluid at the marker at the end of the step, without force */
     lw_ordered *order;     /* (count) of the markers in `mobility` and `solution` */
-    int32_t *box;          /* (blocks,6) lowest and highest `cell` of each 8 markers, in that order */
+    int32_t *cells;        /* (blocks,3,8) `cell` of the markers in that order */
+    int32_t *box;          /* (blocks,6) the lowest and the highest of a block */
+    int32_t *touched;      /* (blocks) a marker that one of the block must not touch, or -1 */
     lw_tiles mobility;     /* of 8 markers a block: the last ones of the last block may be none */
     double *solution;      /* (8 blocks, width), width a multiple of 8 of at least 4 bodies + 3 */
     double *products;      /* (width,width) */

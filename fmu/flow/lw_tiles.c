@@ -5,27 +5,30 @@
 
 #include "lw_math.h"
 
-/* c -= a^T b for tiles in rows of the given lengths. */
-LW_INLINE void take(double *restrict c, int64_t c_row, const double *restrict a, int64_t a_row,
-                    const double *restrict b, int64_t b_row) {
-    for (int i = 0; i < LW_TILE; ++i) {
-        double rest[LW_TILE];
-        for (int j = 0; j < LW_TILE; ++j) rest[j] = c[i * c_row + j];
-        for (int p = 0; p < LW_TILE; ++p)
-            for (int j = 0; j < LW_TILE; ++j) rest[j] -= a[p * a_row + i] * b[p * b_row + j];
-        for (int j = 0; j < LW_TILE; ++j) c[i * c_row + j] = rest[j];
+/* A row of a tile, which compilers keep in as few registers as there are to hold it. */
+typedef double lanes __attribute__((vector_size(8 * LW_TILE), aligned(8), may_alias));
+
+LW_INLINE void load(lanes rest[LW_TILE], const double *tile, int64_t row) {
+    for (int i = 0; i < LW_TILE; ++i) rest[i] = *(const lanes *)(tile + i * row);
+}
+
+LW_INLINE void store(double *tile, int64_t row, const lanes rest[LW_TILE]) {
+    for (int i = 0; i < LW_TILE; ++i) *(lanes *)(tile + i * row) = rest[i];
+}
+
+/* rest -= a^T b for tiles in rows of the given lengths. */
+LW_INLINE void take(lanes rest[LW_TILE], const double *a, int64_t a_row, const double *b, int64_t b_row) {
+    for (int p = 0; p < LW_TILE; ++p) {
+        const lanes row = *(const lanes *)(b + p * b_row);
+        for (int i = 0; i < LW_TILE; ++i) rest[i] -= a[p * a_row + i] * row;
     }
 }
 
-/* c -= a b, a of the factor. */
-LW_INLINE void take_upper(double *restrict c, const double *restrict a, const double *restrict b,
-                          int64_t row) {
-    for (int i = 0; i < LW_TILE; ++i) {
-        double rest[LW_TILE];
-        for (int j = 0; j < LW_TILE; ++j) rest[j] = c[i * row + j];
-        for (int p = 0; p < LW_TILE; ++p)
-            for (int j = 0; j < LW_TILE; ++j) rest[j] -= a[i * LW_TILE + p] * b[p * row + j];
-        for (int j = 0; j < LW_TILE; ++j) c[i * row + j] = rest[j];
+/* rest -= a b, a of the factor. */
+LW_INLINE void take_upper(lanes rest[LW_TILE], const double *a, const double *b, int64_t b_row) {
+    for (int p = 0; p < LW_TILE; ++p) {
+        const lanes row = *(const lanes *)(b + p * b_row);
+        for (int i = 0; i < LW_TILE; ++i) rest[i] -= a[i * LW_TILE + p] * row;
     }
 }
 
@@ -65,10 +68,14 @@ LW_INLINE int32_t factorise(const lw_tiles *t, double least) {
         double own[LW_TILE], *diagonal = lw_tile_at(t, i, i);
         for (int k = 0; k < LW_TILE; ++k) own[k] = diagonal[k * LW_TILE + k];
         while (t->end[first] <= i) ++first;
-        for (int32_t p = first; p < i; ++p) {
-            const double *above = lw_tile_at(t, p, i);
-            for (int32_t j = i; j < t->end[p]; ++j)
-                take(lw_tile_at(t, i, j), LW_TILE, above, LW_TILE, lw_tile_at(t, p, j), LW_TILE);
+        for (int32_t j = i, from = first; j < t->end[i] && i > first; ++j) {
+            double *tile = lw_tile_at(t, i, j);
+            lanes rest[LW_TILE];
+            while (from < i && t->end[from] <= j) ++from;
+            load(rest, tile, LW_TILE);
+            for (int32_t p = from; p < i; ++p)
+                take(rest, lw_tile_at(t, p, i), LW_TILE, lw_tile_at(t, p, j), LW_TILE);
+            store(tile, LW_TILE, rest);
         }
         const int32_t bad = pivots(diagonal, own, least);
         if (bad >= 0) return i * LW_TILE + bad;
@@ -80,34 +87,42 @@ LW_INLINE int32_t factorise(const lw_tiles *t, double least) {
 LW_INLINE void forward(const lw_tiles *t, int32_t width, double *x) {
     int32_t first = 0;
     for (int32_t i = 0; i < t->blocks; ++i) {
-        double *mine = x + (int64_t)i * LW_TILE * width;
         while (t->end[first] <= i) ++first;
-        for (int32_t p = first; p < i; ++p) {
-            const double *above = lw_tile_at(t, p, i), *done = x + (int64_t)p * LW_TILE * width;
-            for (int32_t c = 0; c < width; c += LW_TILE) take(mine + c, width, above, LW_TILE, done + c, width);
+        for (int32_t c = 0; c < width; c += LW_TILE) {
+            double *mine = x + (int64_t)i * LW_TILE * width + c;
+            lanes rest[LW_TILE];
+            load(rest, mine, width);
+            for (int32_t p = first; p < i; ++p)
+                take(rest, lw_tile_at(t, p, i), LW_TILE, x + (int64_t)p * LW_TILE * width + c, width);
+            store(mine, width, rest);
+            solve(lw_tile_at(t, i, i), mine, width);
         }
-        for (int32_t c = 0; c < width; c += LW_TILE) solve(lw_tile_at(t, i, i), mine + c, width);
     }
 }
 
 LW_INLINE void backward(const lw_tiles *t, int32_t width, double *x) {
-    for (int32_t i = t->blocks - 1; i >= 0; --i) {
-        double *mine = x + (int64_t)i * LW_TILE * width;
-        for (int32_t j = i + 1; j < t->end[i]; ++j)
-            for (int32_t c = 0; c < width; c += LW_TILE)
-                take_upper(mine + c, lw_tile_at(t, i, j), x + (int64_t)j * LW_TILE * width + c, width);
-        for (int32_t c = 0; c < width; c += LW_TILE) solve_upper(lw_tile_at(t, i, i), mine + c, width);
-    }
+    for (int32_t i = t->blocks - 1; i >= 0; --i)
+        for (int32_t c = 0; c < width; c += LW_TILE) {
+            double *mine = x + (int64_t)i * LW_TILE * width + c;
+            lanes rest[LW_TILE];
+            load(rest, mine, width);
+            for (int32_t j = i + 1; j < t->end[i]; ++j)
+                take_upper(rest, lw_tile_at(t, i, j), x + (int64_t)j * LW_TILE * width + c, width);
+            store(mine, width, rest);
+            solve_upper(lw_tile_at(t, i, i), mine, width);
+        }
 }
 
 LW_INLINE void products(const lw_tiles *t, int32_t width, const double *x, double *out) {
-    for (int32_t k = 0; k < width * width; ++k) out[k] = 0.0;
-    for (int32_t i = 0; i < t->blocks; ++i) {
-        const double *mine = x + (int64_t)i * LW_TILE * width;
-        for (int32_t a = 0; a < width; a += LW_TILE)
-            for (int32_t b = 0; b < width; b += LW_TILE)
-                take(out + a * width + b, width, mine + a, width, mine + b, width);
-    }
+    for (int32_t a = 0; a < width; a += LW_TILE)
+        for (int32_t b = 0; b < width; b += LW_TILE) {
+            lanes rest[LW_TILE] = {{0.0}};
+            for (int32_t i = 0; i < t->blocks; ++i) {
+                const double *rows = x + (int64_t)i * LW_TILE * width;
+                take(rest, rows + a, width, rows + b, width);
+            }
+            store(out + a * width + b, width, rest);
+        }
 }
 
 /* ---- one version for each set of instructions: without fast-math and contraction the same bits ---- */

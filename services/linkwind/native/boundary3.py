@@ -57,7 +57,18 @@ class _Boundary3(ctypes.Structure):
         *((name, ctypes.c_void_p) for name in ("body", "face", "joined", "point")),
         *(
             (name, ctypes.c_void_p)
-            for name in ("arm", "at", "cell", "weight", "lightness", "velocity", "order", "box")
+            for name in (
+                "arm",
+                "at",
+                "cell",
+                "weight",
+                "lightness",
+                "velocity",
+                "order",
+                "cells",
+                "box",
+                "touched",
+            )
         ),
         ("mobility", _Tiles),
         *((name, ctypes.c_void_p) for name in ("solution", "products")),
@@ -94,7 +105,9 @@ class Boundary3:
             _doubles(k * _STENCIL),
             np.zeros((k, 3)),
             np.zeros((k, 2)),  # a number and a double each
+            np.zeros((blocks, 3, _TILE), np.int32),
             np.zeros((blocks, 6), np.int32),
+            np.zeros(blocks, np.int32),
         ]
         matrix: list[NDArray[Any]] = [
             np.zeros(blocks, np.int32),
