@@ -5,7 +5,7 @@
 #endif
 
 enum {
-    ROWS = 16, /* in one part of the job */
+    ROWS = 16,  /* in one part of the job */
     LANES = 16, /* rows are worked on from and up to multiples of it: no remainders, aligned writes */
     AHEAD = 96  /* cells from those in work to those that memory is asked for */
 };
@@ -28,8 +28,8 @@ typedef struct { float x, y, z; } vector;
 typedef struct {
     const lw_lattice3 *lattice;
     int32_t shift[3];
-    int32_t begin, end; /* columns that have a source */
-    int32_t down;       /* rows come from the last to the first */
+    int32_t begin, end;               /* columns that have a source */
+    int32_t down;                     /* rows come from the last to the first */
     int64_t upstream[LW_DIRECTIONS3]; /* from a cell of the first volume to what streams into it */
     float stream[LW_DIRECTIONS3];
 } step_job;
@@ -71,11 +71,10 @@ LW_INLINE axis an_axis(float momentum, float inverse, float force, int forced) {
     return a;
 }
 
-/* Collide: the part of the second central moments that has no trace relaxes by `keep` = 1 - omega towards zero,
- * their trace and all higher ones are set to equilibrium. Momentum goes from j to j + F; q = j + F/2 = rho u.
- * Of the raw moments those of second order are kept less 1/3, those of fourth order less 1/9: their values at
- * rest. In each plane of two axes the algebra is that of two dimensions. Terms in the force come last: without
- * them the result has the bits of a force of zero. */
+/* Collide: the part of the second central moments without trace relaxes by `keep` = 1 - omega towards zero, their
+ * trace and all higher ones are set to equilibrium. Momentum goes from j to j + F; q = j + F/2 = rho u. Of the raw
+ * moments m_aa are kept less 1/3, m_aabb less 1/9: their values at rest. In each plane of two axes the algebra is
+ * that of two dimensions. Terms in the force come last: without them the result has the bits of a force of zero. */
 LW_INLINE cell collide(cell f, float keep, vector force, int forced) {
     const float third = 1.0f / 3.0f;
     const float along_x = f.px + f.mx, along_y = f.py + f.my, along_z = f.pz + f.mz;
@@ -145,7 +144,7 @@ typedef struct {
     const float *force[3];
 } passage;
 
-/* A collision is as long as what the processor looks ahead: it would wait for memory in each. */
+/* A collision is as long as what the processor looks ahead: unasked, it would wait for memory in each. */
 LW_INLINE void prefetch(const passage *row, int64_t i) {
 #if defined(__GNUC__)
     for (int q = 0; q < LW_DIRECTIONS3; ++q) {
@@ -191,9 +190,9 @@ LW_INLINE void collide_cells(const passage *row, int32_t begin, int32_t end, flo
     }
 }
 
-/* A row without its end cells, from its last cells to the first where the rows come so: the processor expects the
- * memory to go on as it came. Rounded to whole vectors, some cells are computed from what happens to lie beside
- * the source's row, and are overwritten. */
+/* A row without its end cells; from its last cells to the first where the rows come so, because the processor
+ * expects memory to go on as it came. Rounded to whole vectors, some cells are computed from what happens to lie
+ * beside the source's row, and are overwritten. */
 LW_INLINE void collide_row(const step_job *job, const passage *row, int forced) {
     const int32_t begin = down(job->begin), end = up(job->end, job->lattice->nx);
     const int32_t vectors = (end - begin + LANES - 1) / LANES, ahead = job->down ? -AHEAD : AHEAD;
@@ -232,6 +231,7 @@ LW_INLINE void fill(const step_job *job, const passage *row, int32_t begin, int3
 
 LW_INLINE int outermost(int32_t at, int32_t n) { return at < 1 || at > n - 2; }
 
+/* A row from the old window to the new one. */
 LW_INLINE void advance_row(const step_job *job, int32_t number) {
     const lw_lattice3 *lattice = job->lattice;
     const int32_t nx = lattice->nx, ny = lattice->ny, nz = lattice->nz, j = number % ny, k = number / ny;
@@ -259,8 +259,9 @@ LW_INLINE void advance_row(const step_job *job, int32_t number) {
     if (of_j > 0.0f || of_k > 0.0f) {
         relax(job, &row, 0, nx, of_j + of_k * (1.0f - of_j));
     } else {
-        relax(job, &row, 0, up(lattice->fringe, nx), 0.0f);
-        relax(job, &row, down(nx - lattice->fringe), nx, 0.0f);
+        const int32_t left = up(lattice->fringe, nx), right = larger(left, down(nx - lattice->fringe));
+        relax(job, &row, 0, left, 0.0f);
+        relax(job, &row, right, nx, 0.0f);
     }
     fill(job, &row, 0, job->begin);
     fill(job, &row, job->end, nx);

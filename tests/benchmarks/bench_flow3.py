@@ -1,8 +1,8 @@
 """The fluid in space: cells per second against what memory allows.
 
-A step of a lattice with fringe and force, on one thread, against a loop that copies the same bytes, 19 floats read
-and 19 written per cell (``copy_volumes.c``), in rounds that take turns; the median of the rounds' ratios counts.
-``memcpy`` writes past the caches; that row has no target, nor has that of two threads.
+A step of a lattice with fringe and force, on one thread, against a loop that copies the same bytes, 19 floats
+read and 19 written per cell (``copy_volumes.c``), in rounds that take turns; the median of the rounds' ratios
+counts. ``memcpy`` writes past the caches; that row has no target, nor has that of two threads.
 
 Run with ``python -m tests.benchmarks flow3``.
 """
