@@ -25,7 +25,6 @@ def hill(
 
     Source: M. J. M. Hill, On a spherical vortex, Phil. Trans. R. Soc. A 185, 1894.
     """
-    layers, rows, columns = size
     origin = (-0.6, -0.5, -0.55)
     z, y, x = np.meshgrid(*(o + cell * np.arange(n) for o, n in zip(origin[::-1], size, strict=True)),
                           indexing="ij")  # fmt: skip

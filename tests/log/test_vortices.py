@@ -48,7 +48,6 @@ def frame() -> VolumeFrame:
 
 
 def test_the_vorticity_of_hill_s_vortex_is_that_of_the_book(frame: VolumeFrame) -> None:
-    layers, rows, columns = frame.shape
     z, y, x = np.meshgrid(*(o + frame.cell * np.arange(n) for o, n in zip(
         frame.origin[::-1], frame.shape, strict=True)), indexing="ij")  # fmt: skip
     x, y, z = x - START - SPEED * 0.1, y - AXIS[0], z - AXIS[1]
@@ -99,8 +98,8 @@ def test_surfaces_lie_around_the_ring_and_carry_its_vorticity_and_velocity(frame
 
 @pytest.mark.parametrize("noise", [0.0, 1e-4])
 def test_in_a_stream_nothing_turns(noise: float) -> None:
-    around = noise * np.random.default_rng(2).normal(size=(8, 9, 10, 3))
-    frame = VolumeFrame(0, 0, (0.0, 0.0, 0.0), 0.1, (around + [5.0, 0.0, 0.0]).astype("f4"),
+    around = np.array([5.0, 0.0, 0.0]) + noise * np.random.default_rng(2).normal(size=(8, 9, 10, 3))
+    frame = VolumeFrame(0, 0, (0.0, 0.0, 0.0), 0.1, around.astype("f4"),
                         np.zeros((8, 9, 10), "f4"))  # fmt: skip
     found = scale([frame])
     assert math.isinf(found.level)
