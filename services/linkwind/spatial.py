@@ -23,6 +23,17 @@ def address(array: Array) -> int:
     return int(array.__array_interface__["data"][0])
 
 
+def rotations(orientation: Array) -> Array:
+    """Return the rotation matrices of unit quaternions (w, x, y, z), shape (n, 4), as shape (n, 3, 3)."""
+    w, x, y, z = orientation.T
+    rows = (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+        (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
+        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+    )
+    return np.ascontiguousarray(np.moveaxis(np.array(rows), -1, 0))
+
+
 class Motion:
     """Poses and twists of bodies as four arrays, which may be views into a message.
 
@@ -62,13 +73,7 @@ class Motion:
 
     def rotation(self) -> Array:
         """Return rotation matrices, body to world, shape (n, 3, 3); column j is axis j of the body in W."""
-        w, x, y, z = self.orientation.T
-        rows = (
-            (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
-            (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
-            (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
-        )
-        return np.ascontiguousarray(np.moveaxis(np.array(rows), -1, 0))
+        return rotations(self.orientation)
 
     def __len__(self) -> int:
         return len(self.position)

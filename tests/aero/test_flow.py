@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from linkwind.errors import SimulationError
 from linkwind.runs.validate import balance, free, plate
 from linkwind.runs.validate.driven import motion
+from linkwind.runs.validate.scenes import CIRCLE
 from linkwind.spatial import Wrench
 from tests.aero.flows import STEP, answer, driven, swing
 
@@ -121,3 +123,14 @@ def test_evaluations_change_nothing():
     first = answer(flow.model, 11 * STEP)
     answer(flow.model, 11 * STEP + 0.5 * STEP)
     assert answer(flow.model, 11 * STEP) == first
+
+
+def test_a_closed_body_lighter_than_the_fluid_inside_is_refused():
+    """Below some 0.75 of what it displaces (32 cells) a free circle is thrown about; plates need none."""
+    displaced = np.pi / 4.0
+    light = driven(f"bodies.0.mass={0.5 * displaced!r}", shape=CIRCLE, cells=32, step=0.25 * STEP)
+    expected = r"body.*mass: expected at least 0\.\d+ kg, for the fluid inside"
+    with pytest.raises(SimulationError, match=expected):
+        light.go(swing, steps=2)
+    driven(f"bodies.0.mass={0.9 * displaced!r}", shape=CIRCLE, cells=32, step=0.25 * STEP).go(swing, steps=2)
+    driven("bodies.0.mass=0.0", "bodies.0.inertia=0.0").go(swing, steps=2)

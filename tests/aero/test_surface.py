@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from linkwind.aero.flow.nearness import distance
-from linkwind.aero.flow.outline import OUTLINE_INSET, PLATE_INSET, SPACING, inset
+from linkwind.aero.flow.outline import SPACING, inset
 from linkwind.aero.flow.rings import CLOSEST
-from linkwind.aero.flow.surface import surface_markers
+from linkwind.aero.flow.surface import CLOSED_INSET, EDGE_INSET, surface_markers
 from linkwind.scenario.bodies import Body, Joint
 
 CELL = 0.25
 VISCOSITY = 0.01
 AT_REST = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-FREE, CLOSED = inset(PLATE_INSET, VISCOSITY), inset(OUTLINE_INSET, VISCOSITY)
+FREE, CLOSED = inset(EDGE_INSET, VISCOSITY), inset(CLOSED_INSET, VISCOSITY)
 
 
 def body(shape, name="body"):
@@ -54,7 +54,7 @@ def test_a_plate_is_a_grid_drawn_in_at_its_free_edges():
 
 def test_a_small_plate_keeps_two_markers_each_way():
     markers = surface_markers([plate(3, 3)], [], AT_REST[None], CELL, 1e-6)
-    assert inset(PLATE_INSET, 1e-6) > 1.5  # more than there is
+    assert inset(EDGE_INSET, 1e-6) > 1.5  # more than there is
     half = SPACING / 2
     np.testing.assert_allclose(np.abs(markers.point), np.tile([half, 0, half], (4, 1)))
 
@@ -138,9 +138,9 @@ def test_markers_of_an_ellipsoid_are_spread_evenly_and_drawn_in_along_its_normal
     assert np.abs(points).max(axis=0) == pytest.approx(half - CLOSED, abs=0.6)
     fine = _fibonacci(half, 20000)
     for point in points[:: max(1, len(points) // 50)]:
-        assert np.linalg.norm(fine - point, axis=1).min() == pytest.approx(CLOSED, abs=0.06)
+        assert np.linalg.norm(fine - point, axis=1).min() == pytest.approx(CLOSED, abs=0.1)
     area = _area(half - CLOSED)
-    assert len(points) == pytest.approx(area / SPACING**2, rel=0.12)
+    assert len(points) == pytest.approx(area / SPACING**2, rel=0.15)
 
 
 def _fibonacci(half, count):

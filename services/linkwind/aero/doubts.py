@@ -89,9 +89,7 @@ def _too_light(scenario: Scenario, provider: Provider) -> Iterator[str]:
         return
     wanted = next(ratio for count, ratio in WANTED if grid.substeps <= count)
     for body in grids.bodies(scenario, provider):
-        assert body.shape is not None
-        # Of a plate across its motion, and of a circle; of other shapes it is the most that it can be, about.
-        fluid = 0.25 * math.pi * grid.density * body.shape.reference_length**2
+        fluid = grids.moved(body, grid)
         if body.mass < wanted * fluid:
             yield (
                 f'{item(scenario, provider, "flow", "cells")}: "{body.name}", {body.mass:g} kg, accelerates '

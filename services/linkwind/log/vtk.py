@@ -22,7 +22,7 @@ from linkwind.log import contents, tables
 from linkwind.log.reader import Log
 from linkwind.log.scenarios import recorded
 from linkwind.log.vortices import criterion, gradient, vorticity
-from linkwind.spatial import Array
+from linkwind.spatial import Array, rotations
 
 STATES = 300  # of the bodies, where there are no frames
 VERTEX, POLYLINE, POLYGON, QUAD = 1, 4, 7, 9  # types of VTK's cells
@@ -181,7 +181,7 @@ def _states(log: Log, times: Sequence[int]) -> Iterator[tuple[int, dict[str, Any
 
 def _bodies(hl: Any, path: Path, log: Log, state: dict[str, Any]) -> str:
     outlines = _outlines(log)
-    turn = _rotations(state["motion.orientation"].reshape(-1, 4))[outlines.body]
+    turn = rotations(state["motion.orientation"].reshape(-1, 4))[outlines.body]
     position = state["motion.position"].reshape(-1, 3)
     points = np.einsum("pij,pj->pi", turn, outlines.points) + position[outlines.body]
     wrench = state["wrench"].reshape(-1, 6)
@@ -213,14 +213,3 @@ def _outlines(log: Log) -> Outlines:
         types.append(VERTEX if each.shape is None else POLYGON if each.shape.closed else POLYLINE)
     ends = np.cumsum([len(each) for each in points])
     return Outlines(np.vstack(points), np.array(body), ends, np.array(types, np.uint8))
-
-
-def _rotations(q: Array) -> Array:
-    """Return the rotation matrices of unit quaternions (w, x, y, z), shape (n, 3, 3)."""
-    w, x, y, z = q.T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)

@@ -11,17 +11,22 @@ from linkwind.aero.base import body_indices, item
 from linkwind.errors import ScenarioError
 from linkwind.scenario import Provider, Scenario
 from linkwind.scenario.bodies import Body
-from linkwind.scenario.shapes import Circle, Ellipse, Rectangle, signed_area
+from linkwind.scenario.shapes import AnyShape, Circle, Ellipse, Ellipsoid, Rectangle, signed_area
 from linkwind.spatial import Array
 
 MAX_SPEED = 0.12  # cells a step that body or wind may go: a Mach number of 0.21
-FRINGE = 24  # layers at the border of the window that relax towards the stream
-MARGIN = (10.0, 8.0)  # default window: what there is besides the mechanism, in lengths of the longest body
+# By dimensions: layers at the border of the window that relax towards the stream; what there is in the
+# default window besides the mechanism, in lengths of the longest body; cells that each side is a multiple
+# of; most cells.
+FRINGE = {2: 24, 3: 12}
+MARGIN = {2: (10.0, 8.0), 3: (4.0, 3.0, 3.0)}
+MULTIPLE = {2: (16, 16), 3: (16, 8, 8)}
+MAX_CELLS = {2: 2**27, 3: 2**25}
+SIDES = ("width", "height", "depth")
 ASIDE = 0.1  # share of the window by which the mechanism stands upstream of its middle
 THINNEST = 4.0  # cells across a closed shape
 SHORTEST = 8.0  # cells along a body
 MAX_SUBSTEPS = 256  # lattice steps in a communication step
-MAX_CELLS = 2**27
 
 
 @dataclass(frozen=True)
@@ -33,20 +38,20 @@ class Grid:
         step: time of a lattice step [s].
         substeps: lattice steps in a communication step.
         length: of the longest body [m].
-        place: where the middle of the mechanism stands in the window, as a share of its width and height.
-        density: of the fluid times the span of the bodies [kg/m²].
+        place: where the middle of the mechanism stands in the window, as a share of its sides.
+        density: of the fluid [kg/m³], in the plane times the span of the bodies [kg/m²].
         viscosity: kinematic [m²/s].
-        wind: [m/s], in W.
+        wind: [m/s], in W, as many components as dimensions.
     """
 
     cell: float
     step: float
     substeps: int
     length: float
-    place: tuple[float, float]
+    place: tuple[float, ...]
     density: float
     viscosity: float
-    wind: tuple[float, float]
+    wind: tuple[float, ...]
 
     @property
     def speed(self) -> float:
@@ -54,9 +59,19 @@ class Grid:
         return self.cell / self.step
 
     @property
-    def stream(self) -> tuple[float, float]:
+    def dimensions(self) -> int:
+        """Of the flow."""
+        return len(self.wind)
+
+    @property
+    def fringe(self) -> int:
+        """Layers at the border of the window that relax towards the stream."""
+        return FRINGE[self.dimensions]
+
+    @property
+    def stream(self) -> tuple[float, ...]:
         """The wind [cells/step]."""
-        return self.wind[0] / self.speed, self.wind[1] / self.speed
+        return tuple(component / self.speed for component in self.wind)
 
     @property
     def lattice_viscosity(self) -> float:
@@ -76,12 +91,13 @@ def plan(scenario: Scenario, provider: Provider) -> Grid:
         ScenarioError: it would be too coarse, or its steps too many.
     """
     flow, environment, acted = provider.flow, scenario.environment, bodies(scenario, provider)
-    length = max(body.shape.reference_length for body in acted if body.shape)
+    dimensions = flow.dimensions
+    length = max(extent(body, dimensions) for body in acted)
     cell = length / flow.cells
     _check_resolution(scenario, provider, acted, cell)
-    wind = environment.wind[:2]
+    wind = environment.wind[:dimensions]
     step = scenario.coupling.step_ns / 1e9
-    fastest = max(math.hypot(*wind), *(_speed(body) for body in acted))
+    fastest = max(math.hypot(*wind), *(_speed(body, dimensions) for body in acted))
     substeps = max(1, math.ceil(fastest * step / cell / MAX_SPEED - 1e-9))
     if substeps > MAX_SUBSTEPS:
         raise ScenarioError(
@@ -90,39 +106,65 @@ def plan(scenario: Scenario, provider: Provider) -> Grid:
             f"{step * MAX_SUBSTEPS / substeps:.2g} s, "
             "or fewer cells."
         )
-    span = next(body.shape.span for body in acted if body.shape)
+    span = next(body.shape.span for body in acted if body.shape) if dimensions == 2 else 1.0
     return Grid(
-        cell, step / substeps, substeps, length, _place(scenario), environment.density * span,
-        environment.viscosity, (wind[0], wind[1]),
+        cell, step / substeps, substeps, length, _place(scenario, dimensions), environment.density * span,
+        environment.viscosity, wind,
     )  # fmt: skip
 
 
-def _speed(body: Body) -> float:
-    """Return the speed of the fastest point of a body at the start, as far as it states it [m/s]."""
+def extent(body: Body, dimensions: int) -> float:
+    """Return the longest extent of a body in the flow [m]."""
+    assert body.shape is not None  # the scenario has been checked
+    length = body.shape.reference_length
+    return length if dimensions == 2 else max(length, body.shape.span)
+
+
+def reach(body: Body, dimensions: int) -> float:
+    """Return how far a body reaches from its middle [m]."""
     assert body.shape is not None
-    turning = abs((body.angular_velocity or (0.0, 0.0, 0.0))[2])
-    return math.hypot(*(body.velocity or (0.0,))) + turning * 0.5 * body.shape.reference_length
+    across = body.shape.span if dimensions == 3 else 0.0
+    return 0.5 * math.hypot(body.shape.reference_length, across)
 
 
-def window(scenario: Scenario, provider: Provider, grid: Grid, centres: Array) -> tuple[int, int]:
-    """Return the columns and rows of a window for bodies whose centres of mass are at ``centres`` [m].
+def moved(body: Body, grid: Grid) -> float:
+    """Return the mass of fluid that a body accelerates with it [kg]: the most that it can be, about.
+
+    That of a plate across its motion, and of a circle.
+    """
+    assert body.shape is not None
+    sides = (body.shape.reference_length, body.shape.span)
+    volume = sides[0] ** 2 if grid.dimensions == 2 else min(sides) ** 2 * max(sides)
+    return 0.25 * math.pi * grid.density * volume
+
+
+def _speed(body: Body, dimensions: int) -> float:
+    """Return the speed of the fastest point of a body at the start, as far as it states it [m/s]."""
+    turning = math.hypot(*(body.angular_velocity or (0.0,)))
+    return math.hypot(*(body.velocity or (0.0,))) + turning * reach(body, dimensions)
+
+
+def window(scenario: Scenario, provider: Provider, grid: Grid, centres: Array) -> tuple[int, ...]:
+    """Return the cells of a window along each axis, for bodies whose centres of mass are at ``centres`` [m].
 
     Raises:
         ScenarioError: too small or too large.
     """
-    reach = np.ptp(centres, axis=0) + grid.length
-    sides = provider.flow.window or (reach + grid.length * np.array(MARGIN)).tolist()
-    columns, rows = (16 * max(1, round(side / grid.cell / 16)) for side in sides)
-    _check_window(scenario, provider, (columns, rows), grid.cell)
-    return columns, rows
+    mechanism = np.ptp(centres, axis=0) + grid.length
+    margin = grid.length * np.array(MARGIN[grid.dimensions])
+    sides = provider.flow.window or (mechanism + margin).tolist()
+    multiples = MULTIPLE[grid.dimensions]
+    size = tuple(m * max(1, round(side / grid.cell / m)) for side, m in zip(sides, multiples, strict=True))
+    _check_window(scenario, provider, size, grid)
+    return size
 
 
 def _check_resolution(scenario: Scenario, provider: Provider, acted: list[Body], cell: float) -> None:
     for body in acted:
         shape = body.shape
         assert shape is not None
-        across = _thickness(shape) / cell if shape.closed else math.inf
-        along = shape.reference_length / cell
+        across = _thickness(shape, provider.flow.dimensions) / cell if shape.closed else math.inf
+        along = extent(body, provider.flow.dimensions) / cell
         need = max(THINNEST / across, SHORTEST / along)
         if need > 1.0:
             got = f"{along:.3g} along" + (f", {across:.3g} across" if shape.closed else "")
@@ -133,37 +175,40 @@ def _check_resolution(scenario: Scenario, provider: Provider, acted: list[Body],
             )
 
 
-def _thickness(shape: object) -> float:
+def _thickness(shape: AnyShape, dimensions: int) -> float:
     """Return the least extent of a closed shape [m]; of a polygon, about."""
-    if isinstance(shape, Ellipse | Rectangle):
-        return min(shape.length, shape.width)
-    if isinstance(shape, Circle):
-        return shape.diameter
-    outline = shape.outline()  # type: ignore[attr-defined]
-    return signed_area(outline) / float(np.ptp(outline, axis=0).max())
+    along_z = shape.span if dimensions == 3 else math.inf
+    match shape:
+        case Ellipse() | Rectangle():
+            return min(shape.length, shape.width, along_z)
+        case Circle():
+            return min(shape.diameter, along_z)
+        case Ellipsoid():
+            return min(shape.size)
+    outline = shape.outline()
+    return min(signed_area(outline) / float(np.ptp(outline, axis=0).max()), along_z)
 
 
-def _check_window(scenario: Scenario, provider: Provider, size: tuple[int, int], cell: float) -> None:
-    least = 2 * FRINGE + 16
+def _check_window(scenario: Scenario, provider: Provider, size: tuple[int, ...], grid: Grid) -> None:
+    least = 2 * grid.fringe + 16
     where = item(scenario, provider, "flow", "window")
-    for name, cells in zip(("width", "height"), size, strict=True):
+    for name, cells in zip(SIDES, size, strict=False):
         if cells < least:
             raise ScenarioError(
-                f"{where}: expected a {name} of at least {least * cell:.4g} m, {least} cells; got {cells} "
-                f"cells. "
-                "Make it larger, or leave it out."
+                f"{where}: expected a {name} of at least {least * grid.cell:.4g} m, {least} cells; got "
+                f"{cells} cells. Make it larger, or leave it out."
             )
-    if size[0] * size[1] > MAX_CELLS:
+    most = MAX_CELLS[grid.dimensions]
+    if math.prod(size) > most:
+        got = " × ".join(map(str, size))
         raise ScenarioError(
-            f"{where}: expected at most {MAX_CELLS} cells; got {size[0]} × {size[1]}. Make it smaller, or "
-            f"use "
-            "fewer cells."
+            f"{where}: expected at most {most} cells; got {got}. Make it smaller, or use fewer cells."
         )
 
 
-def _place(scenario: Scenario) -> tuple[float, float]:
+def _place(scenario: Scenario, dimensions: int) -> tuple[float, ...]:
     """Return where to put the mechanism: upstream and below, for its wake goes with the wind and upwards."""
-    flow = np.array(scenario.environment.wind[:2])
-    up = -np.array(scenario.environment.gravity[:2])
-    x, y = 0.5 + np.zeros(2) - ASIDE * sum(v / np.hypot(*v) for v in (flow, up) if v.any())
-    return float(x), float(y)
+    flow = np.array(scenario.environment.wind[:dimensions])
+    up = -np.array(scenario.environment.gravity[:dimensions])
+    middle = 0.5 + np.zeros(dimensions) - ASIDE * sum(v / math.hypot(*v) for v in (flow, up) if v.any())
+    return tuple(middle.tolist())

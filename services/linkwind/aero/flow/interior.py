@@ -1,4 +1,4 @@
-"""The fluid inside closed outlines, which is not there in truth.
+"""The fluid inside closed outlines and surfaces, which is not there in truth.
 
 The markers push it along with the body; the force that this takes is given back, as that of a rigid body of
 the fluid's density (M. Uhlmann 2005, doi:10.1016/j.jcp.2005.03.017; Z.-G. Feng, E. E. Michaelides 2009).
@@ -9,12 +9,14 @@ from __future__ import annotations
 import numpy as np
 
 from linkwind.scenario.bodies import Body
-from linkwind.scenario.shapes import signed_area
-from linkwind.spatial import Array
+from linkwind.scenario.shapes import Ellipsoid, signed_area
+from linkwind.spatial import Array, rotations
+
+OUTLINE = 2000  # points of an outline whose moments are taken
 
 
 class Interior:
-    """Momentum of the fluid inside the outlines of some bodies, as if it were rigid.
+    """Momentum of the fluid inside the outlines of some bodies in the plane, as if it were rigid.
 
     Attributes:
         any: whether there is any.
@@ -39,12 +41,63 @@ class Interior:
         return matrix
 
 
+class InteriorInSpace:
+    """Momentum of the fluid inside the surfaces of some bodies in space, as if it were rigid.
+
+    Attributes:
+        any: whether there is any.
+    """
+
+    def __init__(self, bodies: list[Body], density: float) -> None:
+        """Compute volumes and their first and second moments about the centres of mass; density in kg/m³."""
+        moments = [_moments_in_space(body) for body in bodies]
+        self._volume = density * np.array([volume for volume, _, _ in moments])
+        self._first = density * np.array([first for _, first, _ in moments])
+        self._second = density * np.array([second for _, _, second in moments])
+        self.any = bool(self._volume.any())
+
+    def inertia(self, pose: Array) -> Array:
+        """Return the inertia of the inside, shape (n, 6, 6), in W, for poses, shape (n, 7)."""
+        found = np.zeros((len(pose), 6, 6))
+        for body, turn in enumerate(rotations(pose[:, 3:])):
+            of_body = found[body]
+            x, y, z = turn @ self._first[body]
+            second = turn @ self._second[body] @ turn.T
+            of_body[:3, :3] = self._volume[body] * np.eye(3)
+            of_body[3:, :3] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
+            of_body[:3, 3:] = of_body[3:, :3].T
+            of_body[3:, 3:] = np.trace(second) * np.eye(3) - second
+        return found
+
+
+def _moments_in_space(body: Body) -> tuple[float, Array, Array]:
+    """Return volume, its first moments (3,) and its second moments (3, 3) about the centre of mass."""
+    shape, second = body.shape, np.zeros((3, 3))
+    if shape is None or not shape.closed:
+        return 0.0, np.zeros(3), second
+    if isinstance(shape, Ellipsoid):
+        size = np.array(shape.size)
+        volume = float(np.pi / 6.0 * size[0] * size[1] * size[2])
+        return volume, np.zeros(3), np.diag(volume / 20.0 * size**2)
+    area, x, y, _ = _moments(body)
+    points = shape.outline(OUTLINE)
+    following = np.roll(points, -1, axis=0)
+    cross = points[:, 0] * following[:, 1] - following[:, 0] * points[:, 1]
+    both = points + following
+    for i in (0, 1):
+        for j in (0, 1):
+            ends = points[:, i] * points[:, j] + following[:, i] * following[:, j]
+            second[i, j] = shape.span / 24.0 * float(((ends + both[:, i] * both[:, j]) * cross).sum())
+    second[2, 2] = area * shape.span**3 / 12.0
+    return area * shape.span, shape.span * np.array([x, y, 0.0]), second
+
+
 def _moments(body: Body) -> tuple[float, float, float, float]:
     """Return area, first moments x and y, and polar moment of an outline about the centre of mass."""
     shape = body.shape
     if shape is None or not shape.closed:
         return 0.0, 0.0, 0.0, 0.0
-    points = shape.outline(2000)
+    points = shape.outline(OUTLINE)
     (x, y), (x1, y1) = points.T, np.roll(points, -1, axis=0).T
     cross = x * y1 - x1 * y
     first_x, first_y = ((a + b) * cross for a, b in ((x, x1), (y, y1)))

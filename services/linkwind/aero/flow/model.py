@@ -17,15 +17,14 @@ import numpy as np
 
 from linkwind.aero.base import Capabilities, body_indices
 from linkwind.aero.flow import grid as grids
-from linkwind.aero.flow.interior import Interior
-from linkwind.aero.flow.motion import Planar, between, planar
-from linkwind.aero.flow.outline import markers
+from linkwind.aero.flow.geometry import geometry
+from linkwind.aero.flow.motion import State
 from linkwind.aero.flow.refusals import Refusals
 from linkwind.aero.flow.start import SmoothStart
 from linkwind.aero.flow.window import Window
 from linkwind.errors import ProtocolError
-from linkwind.frames import FlowFrame
-from linkwind.native.boundary import Boundary, Placement
+from linkwind.frames import FlowFrame, VolumeFrame
+from linkwind.native.boundary import Placement
 from linkwind.scenario import Provider, Scenario
 from linkwind.spatial import Array, Motion, Wrench
 
@@ -36,10 +35,10 @@ _MEMORY = struct.Struct("<qqd")  # step that was committed, the last one with a 
 
 
 class Flow:
-    """Forces of a two-dimensional, unsteady, incompressible flow around the bodies.
+    """Forces of an unsteady, incompressible flow around the bodies, in the plane or in space.
 
-    The wrench [N, N·m] is the mean over a communication step, in W at the centres of mass; per metre of
-    span times the span. It comes with ``G`` where a communication step is one lattice step.
+    The wrench [N, N·m] is the mean over a communication step, in W at the centres of mass; in the plane per
+    metre of span times the span. It comes with ``G`` where a communication step is one lattice step.
 
     Diagnostics: ``mach``, the fastest of wind and bodies over the lattice's speed of sound (errors of
     compressibility grow with its square); ``leak``, the largest flow through an outline over the same
@@ -62,13 +61,13 @@ class Flow:
         first = int(self._bodies[0])
         in_a_row = (self._bodies == np.arange(first, first + len(acted))).all()
         self._rows = slice(first, first + len(acted)) if in_a_row else self._bodies
-        points = markers(acted, list(scenario.joints), self._grid.cell, self._grid.lattice_viscosity)
-        self._boundary = Boundary(len(acted), points)
-        self._interior = Interior(acted, self._grid.density)
-        self._reach = [0.5 * body.shape.reference_length for body in acted if body.shape]
-        self._lengths = np.array([1.0, 1.0, self._grid.cell])  # of a force, a force, a torque
-        rows = (6 * np.arange(len(acted))[:, None] + np.array([0, 1, 5])).ravel()
-        self._planar_entries = (6 * len(acted) * rows[:, None] + rows).ravel()  # of G in space
+        self._in = geometry(self._grid.dimensions)
+        self._interior = self._in.inside(acted, self._grid.density)
+        self._reach = [grids.reach(body, self._grid.dimensions) for body in acted]
+        self._twist = np.array(self._in.twist)
+        self._lengths = np.where(self._twist < 3, 1.0, self._grid.cell)  # of forces, of torques
+        rows = (6 * np.arange(len(acted))[:, None] + self._twist).ravel()
+        self._entries = (6 * len(acted) * rows[:, None] + rows).ravel()  # of G in space
         self._every = max(1, round(scenario.steps / provider.flow.frames)) if provider.flow.frames else 0
         self._h = scenario.coupling.step_ns / 1e9
         self._substeps = self._grid.substeps
@@ -86,12 +85,12 @@ class Flow:
 
     def commit(self, t: float, motion: Motion) -> None:
         """Step the fluid to time t [s] with the accepted motion, or keep where it has gone to already."""
-        accepted = planar(motion, self._rows)
+        accepted = self._in.state(motion, self._rows)
         step = round(t / self._h)
         if self._fluid is None:
             self._begin(accepted)
         elif step > self._step and not self._ahead:
-            self._go(self._wall(t, accepted.twist), look=step % LOOK_EVERY == 0)
+            self._go(self._slowly(t, accepted.twist), look=step % LOOK_EVERY == 0)
         self._step, self._ahead = step, False
         self._keep_slow(accepted)
         self._accepted = accepted
@@ -103,7 +102,7 @@ class Flow:
             ScenarioError: the window is too small or too large.
             SimulationError: a body leaves the window or meets another, is too fast, or the fluid is unstable.
         """
-        self._trial = planar(motion, self._rows)
+        self._trial = self._in.state(motion, self._rows)
         if self._fluid is None:
             self._begin(self._trial)
         elif self._ahead:
@@ -112,10 +111,10 @@ class Flow:
         if self._substeps == 1 or t == 0.0:
             force, response = self._one_step(t)
         else:
-            force, response = self._several_steps(t), np.zeros((3 * len(self._bodies),) * 2)
+            force, response = self._several_steps(t), np.zeros((len(self._twist) * len(self._bodies),) * 2)
         self._write(t, force, response, wrench)
 
-    def frame(self) -> FlowFrame | None:
+    def frame(self) -> FlowFrame | VolumeFrame | None:
         """Return a picture of the fluid if one is due."""
         step = self._step + self._ahead
         if self._fluid is None or not self._every or step == self._shown or step % self._every:
@@ -148,18 +147,19 @@ class Flow:
         if not blob:
             self._fluid, self._step, self._substeps = None, 0, self._grid.substeps
             return
-        n = len(self._bodies)
-        if len(blob) < _MEMORY.size + 14 * n * 8:
+        n, width = len(self._bodies), self._in.width
+        each = width + len(self._twist)  # numbers of a state
+        if len(blob) < _MEMORY.size + 16 * each * n:
             raise ProtocolError(f"model flow: expected a checkpoint; got {len(blob)} bytes.")
         self._step, self._shown, self._leak = _MEMORY.unpack_from(blob)
-        numbers = np.frombuffer(blob, "<f8", 14 * n, _MEMORY.size).reshape(n, 14)
-        parts = np.split(numbers, [4, 7, 11], axis=1)
-        start, accepted = Planar(*parts[:2]), Planar(*parts[2:])
+        numbers = np.frombuffer(blob, "<f8", 2 * each * n, _MEMORY.size).reshape(n, 2 * each)
+        parts = np.split(numbers, [width, each, each + width], axis=1)
+        start, accepted = State(*parts[:2]), State(*parts[2:])
         if self._fluid is None:
             self._begin(start)
         self._set_out(start)
         self._accepted = accepted
-        self._window.restore(blob[_MEMORY.size + 14 * n * 8 :])
+        self._window.restore(blob[_MEMORY.size + 16 * each * n :])
         self._substeps = round(self._h / self._window.step)
         self._measure()
 
@@ -176,75 +176,93 @@ class Flow:
             raise ProtocolError("model flow: expected a first motion, at t = 0; got none.")
         return self._fluid
 
-    def _begin(self, start: Planar) -> None:
+    def _begin(self, start: State) -> None:
         """Fill the window around the bodies."""
-        centres = start.pose[:, :2]
+        centres = start.pose[:, : self._grid.dimensions]
         size = grids.window(self._scenario, self._provider, self._grid, centres)
-        self._fluid = Window(self._grid, size, centres.mean(axis=0), self._provider.flow.threads)
+        self._fluid = Window(self._in, self._grid, size, centres.mean(axis=0), self._provider.flow.threads)
+        self._walls = self._in.walls(self._acted, list(self._scenario.joints), start, self._grid)
         self._measure()
         self._set_out(start)
         self._accepted = start
         self._keep_slow(start)
         _log.info(
-            '"%s": %d × %d cells of %.4g m, %.4g s a lattice step, %d in a communication step; %d markers',
-            self._provider.name, *size, self._grid.cell, self._grid.step, self._substeps,
-            len(self._boundary.markers.body),
+            '"%s": %s cells of %.4g m, %.4g s a lattice step, %d in a communication step; %d markers',
+            self._provider.name, " × ".join(map(str, size)), self._grid.cell, self._grid.step, self._substeps,
+            len(self._walls.markers.body),
         )  # fmt: skip
 
-    def _set_out(self, start: Planar) -> None:
+    def _set_out(self, start: State) -> None:
         self._start = start
-        self._wall = SmoothStart(self._scenario, self._provider, self._grid.length, start.twist)
+        self._slowly = SmoothStart(self._scenario, self._provider, self._grid.length, start.twist)
 
-    def _place(self, t: float, at: Planar) -> None:
-        placement, marker = self._window.place(self._boundary, at.pose)
+    def _place(self, t: float, at: State) -> None:
+        placement, marker = self._window.place(self._walls, at.pose)
         if placement == Placement.PLACED:
             return
-        names = [self._acted[i].name for i in self._boundary.markers.body[marker] if i >= 0]
+        names = [self._acted[i].name for i in np.atleast_1d(self._walls.markers.body[marker]) if i >= 0]
         outside = placement == Placement.OUTSIDE
         raise self._refuse.outside(t, names) if outside else self._refuse.overlap(t, names)
 
     def _one_step(self, t: float) -> tuple[Array, Array]:
-        """Return what the markers ask for: force in N and N·m, shape (n, 3), and G, shape (3n, 3n)."""
+        """Return what the markers ask for: force in N and N·m, shape (n, d), and G, shape (dn, dn)."""
         self._place(t, self._trial)
-        wall = self._wall(t, self._trial.twist)
-        self._boundary.evaluate(self._window.twists(wall))
-        n = len(self._bodies)
-        force = self._boundary.wrench * self._forces
-        response = self._boundary.response * self._responses
+        wall = self._slowly(t, self._trial.twist)
+        self._walls.evaluate(self._window.twists(wall))
+        force = self._walls.wrench * self._forces
+        response = self._walls.response * self._responses
         if t > 0.0 and self._interior.any:
             inertia = self._interior.inertia(self._trial.pose)
             force += self._inside(t, wall, inertia)
-            for i in range(n):
-                response[3 * i : 3 * i + 3, 3 * i : 3 * i + 3] -= inertia[i] / self._h
+            d = len(self._twist)
+            for i, of_body in enumerate(inertia):
+                response[d * i : d * (i + 1), d * i : d * (i + 1)] -= of_body / self._h
+            self._carries_the_inside(inertia, response)
         return force, response
 
+    def _carries_the_inside(self, inertia: Array, response: Array) -> None:
+        """Refuse a free body so light that the fluid inside it, which is to be given back, moves it.
+
+        Measured on circles of 24 to 48 cells: stable where the mass is that of the fluid inside, less half of
+        what moves with the markers in a step.
+        """
+        d, linear = len(self._twist), self._grid.dimensions
+        jointed = {name for joint in self._scenario.joints for name in (joint.parent, joint.child)}
+        for i, body in enumerate(self._acted):
+            if body.shape is None or not body.shape.closed or body.name in jointed:
+                continue
+            least = float(np.linalg.eigvalsh(response[d * i : d * i + linear, d * i : d * i + linear])[0])
+            needed = 0.5 * (float(inertia[i, 0, 0]) - self._h * least)
+            if body.mass < needed:
+                raise self._refuse.lighter_than_inside(body, needed)
+
     def _several_steps(self, t: float) -> Array:
-        """Step the fluid to the trial state; return the mean force, shape (n, 3)."""
+        """Step the fluid to the trial state; return the mean force, shape (n, d)."""
         self._window.keep()
         self._ahead = True
         before, count = t - self._h, self._substeps
-        total = np.zeros((len(self._bodies), 3))
+        total = np.zeros((len(self._bodies), len(self._twist)))
         for i in range(1, count + 1):
             now = before + self._h * i / count
-            at = between(self._accepted, self._trial, i / count, self._h)
+            at = self._in.between(self._accepted, self._trial, i / count, self._h)
             self._place(now, at)
-            wall = self._wall(now, at.twist)
-            self._boundary.evaluate(self._window.twists(wall))
-            total += self._boundary.wrench
+            wall = self._slowly(now, at.twist)
+            self._walls.evaluate(self._window.twists(wall))
+            total += self._walls.wrench
             self._go(wall, look=i == count)
         force = total * (self._forces / count)
         if self._interior.any:
             inertia = self._interior.inertia(self._trial.pose)
-            force += self._inside(t, self._wall(t, self._trial.twist), inertia)
+            force += self._inside(t, self._slowly(t, self._trial.twist), inertia)
         return force
 
     def _go(self, wall: Array, *, look: bool) -> None:
-        leak = self._window.go(self._boundary, wall, look=look)
+        leak = self._window.go(self._walls, wall, look=look)
         self._leak = self._leak if leak is None else leak
 
     def _inside(self, t: float, wall: Array, inertia: Array) -> Array:
-        """Return the force that the fluid inside the outlines took, shape (n, 3)."""
-        before = self._wall(t - self._h, self._accepted.twist)
+        """Return the force that the fluid inside the outlines took, shape (n, d)."""
+        before = self._slowly(t - self._h, self._accepted.twist)
         then = self._interior.inertia(self._accepted.pose)
         gained = (inertia * wall[:, None, :]).sum(axis=2) - (then * before[:, None, :]).sum(axis=2)
         return np.asarray(gained / self._h)
@@ -252,11 +270,12 @@ class Flow:
     def _measure(self) -> None:
         """Compute what a lattice unit of force and torque, and of the response, is [N, N·m; N·s/m …]."""
         each = np.tile(self._lengths, len(self._bodies))
-        newton, speed = self._grid.density * self._grid.cell * self._window.speed**2, self._window.speed
+        speed = self._window.speed
+        newton = self._grid.density * self._grid.cell ** (self._grid.dimensions - 1) * speed**2
         self._forces = newton * self._lengths
         self._responses = newton / speed * np.outer(each, each)
 
-    def _keep_slow(self, at: Planar) -> None:
+    def _keep_slow(self, at: State) -> None:
         """Shorten the lattice step where the bodies have become too fast for it."""
         fastest = at.fastest(self._reach)
         while fastest / self._window.speed > grids.MAX_SPEED:
@@ -265,7 +284,7 @@ class Flow:
             self._shorten(fastest)
 
     def _shorten(self, fastest: float) -> None:
-        light = [body.name for body in self._acted if body.mass < self._grid.density * self._grid.length**2]
+        light = [body.name for body in self._acted if body.mass < grids.moved(body, self._grid)]
         if self._substeps == 1 and light:
             limit = grids.MAX_SPEED * self._window.speed
             raise self._refuse.too_fast_for_light(light[0], fastest, limit)
@@ -283,12 +302,12 @@ class Flow:
     def _write(self, t: float, force: Array, response: Array, wrench: Wrench) -> None:
         if not all(map(math.isfinite, force.ravel().tolist())):
             raise self._refuse.unstable(t, force)
-        wrench.force.fill(0.0)
-        wrench.torque.fill(0.0)
-        wrench.force[:, :2], wrench.torque[:, 2] = force[:, :2], force[:, 2]
+        both = np.zeros((len(force), 6))
+        both[:, self._twist] = force
+        wrench.force[:], wrench.torque[:] = both[:, :3], both[:, 3:]
         if wrench.response is not None:
             wrench.response.fill(0.0)
-            wrench.response.reshape(-1)[self._planar_entries] = response.reshape(-1)
+            wrench.response.reshape(-1)[self._entries] = response.reshape(-1)
         if wrench.diagnostics is not None:
             speed = max(self._trial.fastest(self._reach), math.hypot(*self._grid.wind))
             wrench.diagnostics[:] = (

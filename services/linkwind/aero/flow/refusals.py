@@ -5,7 +5,7 @@ from __future__ import annotations
 from linkwind.aero.base import item
 from linkwind.aero.flow.grid import FRINGE, MAX_SPEED, MAX_SUBSTEPS
 from linkwind.errors import SimulationError
-from linkwind.scenario import Provider, Scenario
+from linkwind.scenario import Body, Provider, Scenario
 from linkwind.spatial import Array
 
 
@@ -20,8 +20,9 @@ class Refusals:
 
     def outside(self, t: float, bodies: list[str]) -> SimulationError:
         """A marker of these bodies has come to the border of the window."""
+        margin = FRINGE[self._provider.flow.dimensions] + 2
         return SimulationError(
-            f"{self._item('window')}: t = {t:.6g} s: expected every body inside the window, {FRINGE + 2} "
+            f"{self._item('window')}: t = {t:.6g} s: expected every body inside the window, {margin} "
             f"cells from its border; got {_named(bodies)} outside. Make the window larger: bodies "
             "drift apart, or start far from each other."
         )
@@ -48,6 +49,15 @@ class Refusals:
             f"{self._scenario.source}: coupling.step: expected bodies below {MAX_SPEED} cells a step, "
             f'{limit:.4g} m/s, because "{body}" is light and needs the response of a single lattice step; '
             f"got {fastest:.4g} m/s. Use at most {0.5 * step:.3g} s."
+        )
+
+    def lighter_than_inside(self, body: Body, least: float) -> SimulationError:
+        """A free closed body has less mass than this [kg]."""
+        index = [other.name for other in self._scenario.bodies].index(body.name)
+        return SimulationError(
+            f"{self._scenario.where('bodies', index)}.mass: expected at least {least:.3g} kg, for the fluid "
+            f"inside a closed shape weighs on a free one that is lighter; got {body.mass:g} kg. Use fewer "
+            "cells, or plates, which may be without mass."
         )
 
     def unstable(self, t: float, force: Array) -> SimulationError:
