@@ -149,9 +149,9 @@ LW_INLINE void advance_row(const step_job *job, int32_t j) {
     if (distance < lattice->fringe) {
         relax(job, j, 0, nx, lw_lattice_blend(lattice, distance));
     } else {
-        const int32_t inner = nx - lattice->fringe;
-        relax(job, j, 0, rounded(lattice->fringe, nx), 0.0f);
-        relax(job, j, inner - inner % LANES, nx, 0.0f);
+        const int32_t inner = nx - lattice->fringe, left = rounded(lattice->fringe, nx);
+        relax(job, j, 0, left, 0.0f);
+        relax(job, j, larger(left, inner - inner % LANES), nx, 0.0f);
     }
     fill(job, j, 0, job->begin);
     fill(job, j, job->end, nx);

@@ -141,8 +141,10 @@ def test_a_shift_is_a_step_of_a_moved_copy_and_the_stream_comes_in(shift, steps)
     assert (one.populations[:, outside] == stream[:, None]).all()
 
 
-def test_the_fringe_relaxes_by_the_stated_weights():
-    bare, fringed = (Lattice(64, 48, shear_rate=1.9, stream=(0.1, 0.0), fringe=n) for n in (1, 12))
+@pytest.mark.parametrize(("nx", "ny", "fringe"), [(64, 48, 12), (44, 48, 18), (18, 20, 5), (76, 80, 34)])
+def test_the_fringe_relaxes_by_the_stated_weights(nx, ny, fringe):
+    """Also where both sides' fringes reach into the same sixteen columns, which are worked on together."""
+    bare, fringed = (Lattice(nx, ny, shear_rate=1.9, stream=(0.1, 0.0), fringe=n) for n in (1, fringe))
     disturbed = bare.populations + rng().normal(scale=1e-3, size=bare.populations.shape)
     stream = bare.populations[:, :1, :1].astype(float)
     for lattice in (bare, fringed):
@@ -151,9 +153,9 @@ def test_the_fringe_relaxes_by_the_stated_weights():
 
     def weights(n):
         layer = np.minimum(np.arange(n), np.arange(n)[::-1])
-        return 0.3 * (np.maximum(12 - layer, 0) / 12) ** 3
+        return 0.3 * (np.maximum(fringe - layer, 0) / fringe) ** 3
 
-    rest = (1 - weights(48))[:, None] * (1 - weights(64))[None, :]
+    rest = (1 - weights(ny))[:, None] * (1 - weights(nx))[None, :]
     rest[[0, -1], :] = rest[:, [0, -1]] = 0
     expected = stream + rest * (bare.populations - stream)
     np.testing.assert_allclose(fringed.populations, expected, rtol=0, atol=ULP / 4)
