@@ -127,12 +127,18 @@ class FlowModel(Section):
     dimensions: Literal[2, 3] = Field(
         default=2, description="Of the flow: 2, the same all along the span of planar bodies, or 3"
     )
-    cells: float = quantity("Cells of the lattice along the longest body", "1", 48.0, ge=8.0, le=2000.0)
+    cells: float = Field(
+        default_factory=lambda known: 24.0 if known.get("dimensions") == 3 else 48.0,
+        ge=8.0,
+        le=2000.0,
+        description="Cells of the lattice along the longest body; default: 48, of three dimensions 24 [1]",
+        json_schema_extra={"unit": "1"},
+    )
     window: Lengths | None = Field(
         default=None,
         description="Width, height and, of three dimensions, depth of the window that goes with the "
         "mechanism [m]; default: 10 and 8 lengths of its longest body more than the mechanism, of three "
-        "dimensions 4, 3 and 3",
+        "dimensions 7, 5 and 5 times the mean of its two longest sides, the geometric one",
         json_schema_extra={"unit": "m"},
     )
     start_time: float | None = quantity(

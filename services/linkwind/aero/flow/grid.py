@@ -16,10 +16,10 @@ from linkwind.spatial import Array
 
 MAX_SPEED = 0.12  # cells a step that body or wind may go: a Mach number of 0.21
 # By dimensions: layers at the border of the window that relax towards the stream; what there is in the
-# default window besides the mechanism, in lengths of the longest body; cells that each side is a multiple
+# default window besides the mechanism, in sizes of the largest body; cells that each side is a multiple
 # of; most cells.
 FRINGE = {2: 24, 3: 12}
-MARGIN = {2: (10.0, 8.0), 3: (4.0, 3.0, 3.0)}
+MARGIN = {2: (10.0, 8.0), 3: (7.0, 5.0, 5.0)}
 MULTIPLE = {2: (16, 16), 3: (16, 8, 8)}
 MAX_CELLS = {2: 2**27, 3: 2**25}
 SIDES = ("width", "height", "depth")
@@ -120,6 +120,13 @@ def extent(body: Body, dimensions: int) -> float:
     return length if dimensions == 2 else max(length, body.shape.span)
 
 
+def _size(body: Body, dimensions: int) -> float:
+    """Return the size of a body that its disturbance of the flow goes with [m]: of a long one less."""
+    assert body.shape is not None
+    length = body.shape.reference_length
+    return length if dimensions == 2 else math.sqrt(length * body.shape.span)
+
+
 def reach(body: Body, dimensions: int) -> float:
     """Return how far a body reaches from its middle [m]."""
     assert body.shape is not None
@@ -151,7 +158,8 @@ def window(scenario: Scenario, provider: Provider, grid: Grid, centres: Array) -
         ScenarioError: too small or too large.
     """
     mechanism = np.ptp(centres, axis=0) + grid.length
-    margin = grid.length * np.array(MARGIN[grid.dimensions])
+    largest = max(_size(body, grid.dimensions) for body in bodies(scenario, provider))
+    margin = largest * np.array(MARGIN[grid.dimensions])
     sides = provider.flow.window or (mechanism + margin).tolist()
     multiples = MULTIPLE[grid.dimensions]
     size = tuple(m * max(1, round(side / grid.cell / m)) for side, m in zip(sides, multiples, strict=True))
