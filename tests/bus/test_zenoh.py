@@ -229,6 +229,31 @@ def test_model_that_cannot_be_built_ends_the_hand_shake(
     assert isinstance(provider.error, SimulationError)
 
 
+@pytest.mark.parametrize(("first", "step"), [(10.0, 1), (0.5, 0)])
+def test_the_first_answer_may_take_as_long_as_a_start(endpoint: str, first: float, step: int) -> None:
+    """A large model is made with the first motion; from then on the time for an answer counts."""
+    release = threading.Event()
+
+    class Large(FakeModel):
+        def evaluate(self, t: float, motion: Motion, wrench: Wrench) -> None:
+            release.wait(1.0 if t == 0.0 else 10.0)
+
+    d = session()
+    link = ZenohDynamicsLink(d, [endpoint], [], 0.3, first=first)
+    provider = Provider(endpoint, Large())
+    try:
+        assert link.wait(lambda: not d.not_ready, 10.0, lambda: None)
+        setting = "coupling.timeout" if step else "bus.start_timeout"
+        late = rf'no Wrench from "aero" for step {step} .* alive\. Is it still computing\? Raise {setting},'
+        with pytest.raises(AnswerTimeoutError, match=late):
+            for k in range(step + 1):
+                exchange(d, link, k)
+    finally:
+        release.set()
+        link.close()
+        provider.join(10.0)
+
+
 def test_dynamics_that_leaves_is_noticed(endpoint: str) -> None:
     d = session()
     link = ZenohDynamicsLink(d, [endpoint], [], 5.0)

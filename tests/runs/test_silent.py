@@ -82,7 +82,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> str:
 @pytest.mark.parametrize(
     ("step", "times", "said"),
     [
-        (0, 1, 'no Wrench from "aero" for step 0 (t = 0 s) within 1 s; it is alive'),
+        (1, 1, 'no Wrench from "aero" for step 1 (t = 0.001 s) within 1 s; it is alive'),
         (37, 2, 'no Wrench from "aero" for step 37 (t = 0.037 s) within 1 s; it is alive'),
         (LAST, 1, '"aero" did not say Bye within 1 s of the last step; it is alive. It is ended'),
     ],

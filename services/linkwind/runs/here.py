@@ -86,7 +86,8 @@ def zenoh_link(
     """
     from linkwind.bus.zenoh import ZenohDynamicsLink
 
-    return ZenohDynamicsLink(session, listen, connect, scenario.coupling.timeout, identity)
+    timeout, first = scenario.coupling.timeout, scenario.bus.start_timeout
+    return ZenohDynamicsLink(session, listen, connect, timeout, identity, first)
 
 
 def _listen_here(session: DynamicsSession, scenario: Scenario, tls: Path | None) -> tuple[DynamicsLink, str]:

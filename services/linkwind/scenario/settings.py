@@ -147,7 +147,9 @@ class Bus(Section):
     transport: Transport = Field(
         default="zenoh", description="zenoh: separate processes; inprocess: everything in one process"
     )
-    start_timeout: float = quantity("Wait this long for every participant to be ready", "s", 60.0, gt=0.0)
+    start_timeout: float = quantity(
+        "Wait this long for every participant to be ready, and for its first answer", "s", 60.0, gt=0.0
+    )
     recovery: float = quantity(
         "Wait this long for a provider that was lost to come back; 0: its loss ends the run", "s", 0.0, ge=0.0
     )

@@ -30,8 +30,8 @@ from linkwind.spatial import Array, rotations
 
 # Cells by which free edges of plates and closed surfaces are drawn in, see `inset`. Calibrated on a square
 # plate and on a sphere: their added masses without viscosity; with some G. G. Stokes' force on a sphere that
-# oscillates, for 1e-3 to 0.1 cells² a step, and the drag of a plate across a stream at Re 100, the same with 8
-# to 28 cells along its chord.
+# oscillates, for 1e-3 to 0.1 cells² a step, and the drag of a plate across a stream at Re 100, which is the
+# same with 8 to 28 cells along its chord.
 EDGE_INSET = (0.85, 0.05, 0.38, 2.4)
 CLOSED_INSET = (0.49, 0.145, 0.25, 1.22)
 FROM_RIM = 0.85 * SPACING  # cells, at least, from the rim of a flat end to the grid in it

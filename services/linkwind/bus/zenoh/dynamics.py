@@ -56,6 +56,7 @@ class ZenohDynamicsLink(Endpoint):
         connect: Sequence[str],
         timeout: float,
         identity: Identity | None = None,
+        first: float = 0.0,
     ) -> None:
         """Open the bus and answer control requests from now on.
 
@@ -65,6 +66,7 @@ class ZenohDynamicsLink(Endpoint):
             connect: zenoh endpoints to connect to, such as a router's.
             timeout: [s] that a living provider may take to answer.
             identity: what this end shows, and by whose authority it lets others in; None without TLS.
+            first: [s] that it may take for the first answer, if that is more: a model may be made with it.
 
         Raises:
             InputError: an endpoint cannot be opened.
@@ -75,7 +77,8 @@ class ZenohDynamicsLink(Endpoint):
         limits = {f"{base}/wrench/*": largest_wrench(bodies)}
         super().__init__(listen, connect, DYNAMICS, security, limits)
         self._exchanging = session
-        self._timeout = timeout
+        self._timeout, self._first = timeout, max(timeout, first)
+        self._patience = self._first
         self._posted_at = float("inf")
         self._waited = 0.0  # s, for the answers to the last motion
         self._unsure_motion = b""
@@ -142,6 +145,7 @@ class ZenohDynamicsLink(Endpoint):
         if not self._unsure_motion:
             self.repeat(motion)
         else:
+            self._patience = self._timeout
             self._outgoing.put(motion)
 
     def repeat(self, motion: bytes) -> None:
@@ -164,16 +168,20 @@ class ZenohDynamicsLink(Endpoint):
         # A provider's time to answer runs while the dynamics waits, not while it writes its log; it does not
         # begin again when something else comes: an old answer, or that of another provider.
         since = time.monotonic() - self._waited
-        while self._waited < self._timeout:
+        while self._waited < self._patience:
             sample = self._receive(SPIN)
             self._waited = time.monotonic() - since
             if sample is not None:
                 return _named(sample)
         late = " and ".join(f'"{name}"' for name in self._exchanging.unanswered)
         raise AnswerTimeoutError(
-            f"no Wrench from {late} for {self._exchanging.where()} within {self._timeout:g} s; it is alive. "
-            "Is it still computing? Raise coupling.timeout, or look at its output"
+            f"no Wrench from {late} for {self._exchanging.where()} within {self._patience:g} s; it is alive. "
+            f"Is it still computing? Raise {self._setting}, or look at its output"
         )
+
+    @property
+    def _setting(self) -> str:
+        return "coupling.timeout" if self._patience == self._timeout else "bus.start_timeout"
 
     def frames(self) -> list[tuple[str, Sent]]:
         """Take the frames that have come; see :class:`~linkwind.bus.base.DynamicsLink`.
