@@ -97,7 +97,7 @@ def test_the_picture_shows_the_bodies_and_the_hinge_in_their_places(run, frames,
             np.testing.assert_allclose(outline, [at - along, at + along], atol=1e-12)
         (hinge,) = [line.get_xydata() for line in ax.lines if line.get_marker() == "o"]
         np.testing.assert_allclose(hinge[0], at - along, atol=1e-9)  # of the second link
-    assert above.get_title() == "t = 0.480 s"
+    assert above.get_title() == "t = 0.48 s"
     assert (below.get_xlabel(), above.get_ylabel()) == ("x [m]", "y [m]")
     assert [ax.get_ylabel() for ax in figure.axes[2:]] == ["speed [m/s]", "vorticity [1/s]"]
 
@@ -167,7 +167,7 @@ def test_the_page_shows_the_flow_and_says_what_is_seen(run, flow):
     (alternative,) = [value for key, value in page.attributes if key == "alt"]
     assert re.fullmatch(
         r"Contours of the speed with streamlines, 0 to \S+ m/s, above contours of the vorticity, ±\S+ 1/s, "
-        r"at t = 0\.300, 0\.480, 0\.600, 0\.900, 1\.140 s, with the outlines of link1 and link2\.",
+        r"at t = 0\.3, 0\.48, 0\.6, 0\.9, 1\.14 s, with the outlines of link1 and link2\.",
         alternative,
     )
     assert "The log holds 21 frames" in page.texts["figcaption"]

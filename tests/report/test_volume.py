@@ -99,7 +99,7 @@ def test_between_two_frames_the_surfaces_go_with_the_vortex(run):
 def test_the_gallery_shows_vortices_and_a_cut_and_says_what_is_seen(run, page):
     assert page.tags.count("figure") == 2
     caption = page.texts["figcaption"]
-    assert "t = 0.010, 0.020, 0.030, 0.040 s" in caption
+    assert "t = 0.01, 0.02, 0.03, 0.04 s" in caption
     assert "The log holds 5 frames." in caption
     assert "60% of all rotation" in caption
     assert f"On the surfaces Q = {run.volumes[0].scale.level:g} 1/s²" in caption

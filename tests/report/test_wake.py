@@ -120,7 +120,7 @@ def test_the_gallery_shows_the_wakes_and_says_what_is_seen(page):
     assert page.tags.count("figure") == 1
     assert "Wakes" in page.texts["figure"]
     caption = page.texts["figcaption"]
-    assert "t = 0.010, 0.020, 0.030, 0.040 s" in caption
+    assert "t = 0.01, 0.02, 0.03, 0.04 s" in caption
     assert "right_wing, left_wing and tail" in caption
     assert f"the last {KEPT} rows, 0.015 s" in caption
     assert "The log holds 5 frames." in caption

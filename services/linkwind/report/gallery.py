@@ -88,7 +88,7 @@ def _flow(run: Run, flow: Flow) -> str:
 
     data, width, height, times = png(run, flow)
     bodies = " and ".join(run.bodies) if len(run.bodies) < 3 else f"{len(run.bodies)} bodies"
-    when = ", ".join(f"{t:.3f}" for t in times)
+    when = ", ".join(f"{t:.4g}" for t in times)
     seen = f"at t = {when} s, with the outlines of {bodies}"
     joints = " A circle marks a joint." if any(run.joint_of) else ""
     alternative = (
@@ -111,7 +111,7 @@ def _vortices(run: Run, volume: Volume) -> str:
     if drawn is None:
         return ""
     data, width, height, times = drawn
-    when, axis = ", ".join(f"{t:.3f}" for t in times), AXES[volume.scale.axis]
+    when, axis = ", ".join(f"{t:.4g}" for t in times), AXES[volume.scale.axis]
     about = f"vorticity about {axis}, ±{number(volume.scale.top)} 1/s"
     bodies = _listed(run.bodies) if len(run.bodies) < 4 else f"{len(run.bodies)} bodies"
     alternative = f"Surfaces of the vortices around {bodies} at t = {when} s, coloured by {about}."
@@ -132,7 +132,7 @@ def _slice(run: Run, volume: Volume) -> str:
     if drawn is None:
         return ""
     (data, width, height, times), axis = drawn
-    when, scale = ", ".join(f"{t:.3f}" for t in times), f"0 to {number(volume.speed)} m/s"
+    when, scale = ", ".join(f"{t:.4g}" for t in times), f"0 to {number(volume.speed)} m/s"
     seen = f"in a plane of constant {axis} through the middle of the mechanism at t = {when} s"
     alternative = f"Contours of the speed, {scale}, {seen}."
     caption = (
@@ -149,7 +149,7 @@ def _wake(run: Run, wake: Wake) -> str:
     if drawn is None:
         return ""
     data, width, height, times = drawn
-    when, provider = ", ".join(f"{t:.3f}" for t in times), wake.provider
+    when, provider = ", ".join(f"{t:.4g}" for t in times), wake.provider
     settings = _settings(run, provider)
     kept = ""
     if settings["model"] == "vortex":

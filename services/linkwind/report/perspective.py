@@ -119,7 +119,7 @@ def pictures(boxes: Sequence[Box], times: Sequence[float], view: View) -> tuple[
     for ax, (low, high), t in zip(axes, boxes, times, strict=False):
         x, y = (0.5 * (low + high)).tolist()
         ax.set(xlim=(x - 0.5 * width, x + 0.5 * width), ylim=(y - 0.5 * height, y + 0.5 * height))
-        ax.set_title(f"t = {t:.3f} s")
+        ax.set_title(f"t = {t:.4g} s")
     _key(axes[-1], view, width, height)
     return figure, axes
 

@@ -93,7 +93,7 @@ def _figure(run: Run, flow: Flow, frames: list[FlowFrame]) -> tuple[Figure, tupl
         above, below = axes[:, column]
         speeds = _speed(above, frame, flow.speed)
         vortices = _vorticity(below, frame, flow.vorticity)
-        above.set_title(f"t = {frame.time_ns / 1e9:.3f} s")
+        above.set_title(f"t = {frame.time_ns / 1e9:.4g} s")
         below.set_xlabel("x [m]")
         for ax in (above, below):
             _mechanism(ax, run, frame)

@@ -187,7 +187,7 @@ def _slices(run: Run, volume: Volume, frames: list[VolumeFrame], normal: int) ->
     fixed = len({frame.extent for frame in frames}) == 1  # else every picture has ticks of its own
     for ax, frame in zip(axes, frames, strict=True):
         filled = _slice(ax, run, volume, frame, (across, up, normal))
-        ax.set_title(f"t = {frame.time_ns / 1e9:.3f} s")
+        ax.set_title(f"t = {frame.time_ns / 1e9:.4g} s")
         ax.set_xlabel(f"{AXES[across]} [m]")
         ax.tick_params(labelleft=not fixed or ax is axes[0])
     axes[0].set_ylabel(f"{AXES[up]} [m]")
