@@ -50,6 +50,21 @@ def test_an_ellipsoid_is_cut_by_the_plane():
     assert body('{ type = "ellipsoid", size = [0.5, 0.2, 0.8] }').shape == shape
 
 
+def test_a_wing_has_chords():
+    """A delta: its chord falls from 0.6 m in the middle to none at the tips; teeth are met twice."""
+    delta = shape_of({"type": "wing", "points": [[0.4, 0.0], [-0.2, -0.5], [-0.2, 0.5]]})
+    assert signed_area(delta.planform) == pytest.approx(0.3)
+    assert (delta.reference_length, delta.span) == (pytest.approx(0.6), 1.0)
+    for z in (-0.4, -0.25, 0.0, 0.1):
+        low, high = delta.chord(z)
+        assert (low, high) == (pytest.approx(-0.2), pytest.approx(0.4 - 0.6 * abs(z) / 0.5))
+    assert delta.chord(0.6) is None
+
+    comb = [[0.0, -0.5], [0.3, 0.5], [0.2, 0.5], [0.0, 0.0], [-0.2, 0.5], [-0.3, 0.5]]
+    assert shape_of({"type": "wing", "points": comb}).chord(0.25) is None
+    np.testing.assert_array_equal(delta.outline(), [[-0.2, 0.0], [0.4, 0.0]])
+
+
 def test_rounded_corners_lie_at_their_radius():
     r, half = 0.06, np.array([0.25, 0.1])
     outline = made("rectangle", radius=r).outline(400)
@@ -82,9 +97,10 @@ def test_a_scenario_keeps_its_shape(kind):
 
 WRONG = [
     ("{}",
-     "type: expected one of plate, ellipse, rectangle, circle, polygon, ellipsoid; got nothing. Add type."),
+     "type: expected one of plate, wing, ellipse, rectangle, circle, polygon, ellipsoid; "
+     "got nothing. Add type."),
     ('{ type = "ellips" }',
-     "type: expected one of plate, ellipse, rectangle, circle, polygon, ellipsoid; "
+     "type: expected one of plate, wing, ellipse, rectangle, circle, polygon, ellipsoid; "
      'got "ellips". Use "ellipse".'),
     ('{ type = "ellipsoid", size = [0.1, 0.1] }',
      "size: expected 3 numbers above 0; got [0.1, 0.1, 0.0]. Correct it."),

@@ -10,7 +10,7 @@ from linkwind.scenario.loading import builtin_names, builtin_text, from_json, lo
 from linkwind.scenario.model import Scenario
 from linkwind.scenario.providers import FieldExpressions, PlateModel, Provider
 from linkwind.scenario.settings import Bus, Coupling, Dynamics, Environment, Gust, Time
-from linkwind.scenario.shapes import AnyShape, Circle, Ellipse, Ellipsoid, Plate, Polygon, Rectangle
+from linkwind.scenario.shapes import AnyShape, Circle, Ellipse, Ellipsoid, Plate, Polygon, Rectangle, Wing
 
 __all__ = [
     "AnyShape",
@@ -32,6 +32,7 @@ __all__ = [
     "Rectangle",
     "Scenario",
     "Time",
+    "Wing",
     "builtin_names",
     "builtin_text",
     "from_json",

@@ -22,6 +22,8 @@ RESERVED = ("dynamics", "observer", "router", "ca")  # that a provider must not 
 
 SINGLE = ("revolute", "prismatic")  # joint types with one coordinate
 
+IN_THE_PLANE = {"wing": "plate", "ellipsoid": "ellipse"}  # shapes of a flow in space, and in their place
+
 NAMED = ("bodies", "joints", "events", "forces", "providers")  # lists of tables
 
 
@@ -218,10 +220,10 @@ def _flow_in_the_plane(scenario: Scenario, acted: list[tuple[int, Body]]) -> Ite
             expected = "one number: the flow is two-dimensional"
             advice = f"Give it about z, {otherwise}"
             yield Problem(("bodies", index, "inertia"), expected, show(body.inertia), advice)
-        if body.shape is not None and body.shape.type == "ellipsoid":
+        if body.shape is not None and body.shape.type in IN_THE_PLANE:
             expected = "a shape with an outline: the flow is two-dimensional"
-            advice = f'Use type = "ellipse", {otherwise}'
-            yield Problem(("bodies", index, "shape", "type"), expected, '"ellipsoid"', advice)
+            advice = f'Use type = "{IN_THE_PLANE[body.shape.type]}", {otherwise}'
+            yield Problem(("bodies", index, "shape", "type"), expected, f'"{body.shape.type}"', advice)
     for index, span in spans:
         if span != spans[0][1]:
             expected = f"the span of the others, {spans[0][1]!r} m: the flow is two-dimensional"

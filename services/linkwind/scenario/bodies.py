@@ -21,7 +21,7 @@ from linkwind.scenario.quantities import (
     numbers,
     quantity,
 )
-from linkwind.scenario.shapes import Circle, Ellipse, Ellipsoid, Plate, Polygon, Rectangle
+from linkwind.scenario.shapes import Circle, Ellipse, Ellipsoid, Plate, Polygon, Rectangle, Wing
 
 JointType = Literal["fixed", "revolute", "prismatic", "planar", "spherical", "free", "distance"]
 
@@ -82,7 +82,7 @@ class Body(Section):
         "elements [Ixx, Iyy, Izz, Ixy, Ixz, Iyz] in the body frame",
         "kg·m²",
     )
-    shape: Plate | Ellipse | Rectangle | Circle | Polygon | Ellipsoid | None = Field(
+    shape: Plate | Wing | Ellipse | Rectangle | Circle | Polygon | Ellipsoid | None = Field(
         default=None, discriminator="type", description="Shape, for force models and pictures"
     )
     picture: Pictures = Field(

@@ -6,7 +6,7 @@ not repeated; the body reaches half its ``span`` to each side of that plane, as 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -152,27 +152,26 @@ class Ellipsoid(Section):
         return 0.5 * np.array(self.size[:2]) * _circle(n)
 
 
-def _points(value: Any) -> tuple[Point, ...]:
-    expected = "a list of at least 3 points [x, y]"
-    advice = "Write [[x, y], [x, y], [x, y]], in the body frame from the centre of mass."
-    entries = value if isinstance(value, list | tuple) else []
-    if len(entries) < 3 or not all(isinstance(entry, list | tuple) and len(entry) == 2 for entry in entries):
-        raise ProblemError.value(expected, value, advice)
-    points = [numbers(entry, expected) for entry in entries]
-    return tuple((x, y) for x, y in points)
+def _corners(plane: str) -> Callable[[Any], tuple[Point, ...]]:
+    """Return how the corners of an outline are read, in the plane "x, y" or "x, z"."""
+
+    def read(value: Any) -> tuple[Point, ...]:
+        expected = f"a list of at least 3 points [{plane}]"
+        advice = f"Write [[{plane}], [{plane}], [{plane}]], in the body frame from the centre of mass."
+        entries = value if isinstance(value, list | tuple) else []
+        if len(entries) < 3 or not all(isinstance(each, list | tuple) and len(each) == 2 for each in entries):
+            raise ProblemError.value(expected, value, advice)
+        points = [numbers(each, expected) for each in entries]
+        return tuple((x, y) for x, y in points)
+
+    return read
 
 
-Points = Annotated[
-    tuple[Point, ...],
-    BeforeValidator(_points),
-    WithJsonSchema(
-        {
-            "type": "array",
-            "items": {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2},
-            "minItems": 3,
-        }
-    ),
-]
+_PAIR = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
+_PAIRS = WithJsonSchema({"type": "array", "items": _PAIR, "minItems": 3})
+
+Points = Annotated[tuple[Point, ...], BeforeValidator(_corners("x, y")), _PAIRS]
+Planform = Annotated[tuple[Point, ...], BeforeValidator(_corners("x, z")), _PAIRS]
 
 
 class Polygon(Section):
@@ -188,11 +187,7 @@ class Polygon(Section):
 
     @model_validator(mode="after")
     def _simple(self) -> Polygon:
-        crossing = _crossing(np.array(self.points))
-        if crossing:
-            sides = " and ".join(f"the one from points[{i}] = {show(self.points[i])}" for i in crossing)
-            advice = "Put the corners in their order around the shape, each once."
-            raise ProblemError([Problem(("points",), "sides that meet only in their corners", sides, advice)])
+        _check_corners(self.points)
         return self
 
     @property
@@ -207,7 +202,62 @@ class Polygon(Section):
         return points if signed_area(points) > 0.0 else points[::-1].copy()
 
 
-AnyShape = Plate | Ellipse | Rectangle | Circle | Polygon | Ellipsoid
+class Wing(Section):
+    """A flat wing without thickness, of any planform: chord along the body's x axis, span along z."""
+
+    closed: ClassVar[bool] = False
+
+    type: Literal["wing"] = Field(description=_KIND)
+    points: Planform = quantity(
+        "Corners [[x, z], …] of the planform, either way, in the body frame from the centre of mass", "m"
+    )
+
+    @model_validator(mode="after")
+    def _simple(self) -> Wing:
+        _check_corners(self.points)
+        return self
+
+    @property
+    def planform(self) -> Array:
+        """Corners (x, z) [m], shape (corners, 2), from x towards z."""
+        points = np.array(self.points)
+        return points if signed_area(points) > 0.0 else points[::-1].copy()
+
+    @property
+    def reference_length(self) -> float:
+        """Extent along the body's x axis [m]."""
+        return float(np.ptp(np.array(self.points)[:, 0]))
+
+    @property
+    def span(self) -> float:
+        """Extent along the body's z axis [m]."""
+        return float(np.ptp(np.array(self.points)[:, 1]))
+
+    def outline(self, n: int = 2) -> Array:
+        """Return ``n`` points of its view along the span, a line [m], shape (n, 2)."""
+        x = np.array(self.points)[:, 0]
+        return np.column_stack([np.linspace(x.min(), x.max(), n), np.zeros(n)])
+
+    def chord(self, z: float) -> tuple[float, float] | None:
+        """Return where a line along the chord enters and leaves the wing [m].
+
+        Args:
+            z: place along the span [m].
+
+        Returns:
+            The least and the largest x; None where the line misses the wing, or meets it more than once.
+        """
+        a, b = self.planform, np.roll(self.planform, -1, axis=0)
+        low, high = np.minimum(a[:, 1], b[:, 1]), np.maximum(a[:, 1], b[:, 1])
+        met = (low <= z) & (z < high)  # a corner counts for the side above it
+        if np.count_nonzero(met) != 2:
+            return None
+        a, b = a[met], b[met]
+        x = a[:, 0] + (z - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
+        return float(x.min()), float(x.max())
+
+
+AnyShape = Plate | Wing | Ellipse | Rectangle | Circle | Polygon | Ellipsoid
 
 _ANY: TypeAdapter[AnyShape] = TypeAdapter(Annotated[AnyShape, Field(discriminator="type")])
 
@@ -226,6 +276,14 @@ def signed_area(points: Array) -> float:
 def _circle(n: int) -> Array:
     angle = np.linspace(0.0, 2.0 * np.pi, n, endpoint=False)
     return np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def _check_corners(points: tuple[Point, ...]) -> None:
+    crossing = _crossing(np.array(points))
+    if crossing:
+        sides = " and ".join(f"the one from points[{i}] = {show(points[i])}" for i in crossing)
+        advice = "Put the corners in their order around the shape, each once."
+        raise ProblemError([Problem(("points",), "sides that meet only in their corners", sides, advice)])
 
 
 def _crossing(points: Array) -> tuple[int, int] | None:
