@@ -13,7 +13,8 @@ from linkwind import aero
 from linkwind.frames import VolumeFrame
 from linkwind.log.isosurface import between
 from linkwind.log.vortices import criterion, gradient, vortices
-from linkwind.report.data import read
+from linkwind.report.data import Diagnostics, read
+from linkwind.report.gallery import gallery
 from linkwind.report.page import render
 from linkwind.report.volume import survey_volume
 from linkwind.report.volumefilm import TRIANGLES, volume_film
@@ -170,3 +171,14 @@ def test_the_page_is_in_space_and_small(run, page):
     assert 64 * largest < 4e6  # characters: with all that a report may have
     assert np.abs(np.mean(film["room"], axis=0)[1:] - AXIS).max() < 0.05
     assert film["room"][0][0] > START - RADIUS
+
+
+@pytest.mark.parametrize(("of_a_cell", "said"), [(20.0, False), (400.0, True)])
+def test_boundary_layers_thinner_than_a_cell_are_said(run, of_a_cell, said):
+    """Of 24 cells along a body a Reynolds number of 400 a cell is one of 9,600."""
+    numbers = Diagnostics("aero", ("cell_reynolds",), np.array([0.0, 1.0]), np.array([[1.0], [of_a_cell]]))
+    providers = [{**run.scenario["providers"][0], "model": "flow", "flow": {"cells": 24.0}}]
+    scenario = {**run.scenario, "providers": providers}
+    caption = gallery(dataclasses.replace(run, scenario=scenario, diagnostics=(numbers,)))
+    assert f"up to {24.0 * of_a_cell:,.0f}." in caption
+    assert ("That of a cell is 400: boundary layers are thinner than a cell" in caption) == said

@@ -17,6 +17,7 @@ from linkwind.scenario.providers import BEYOND_DEG, SEPARATES_DEG
 
 CELL_REYNOLDS = "cell_reynolds"  # a diagnostic of the flow: of a cell and the fastest of wind and bodies
 INCIDENCE = "incidence_deg"  # of vortex: the largest angle of attack
+UNRESOLVED = 100  # cell Reynolds number from which boundary layers are thinner than a cell
 SPATIAL = 1000  # Reynolds number from which the wake of a bluff body is far from two-dimensional
 
 
@@ -44,6 +45,17 @@ def _said(reynolds: float | None) -> str:
         return ""
     return (
         f" Reynolds number of the longest body and the fastest of wind and bodies: up to {_round(reynolds)}."
+    )
+
+
+def _thin_layers(run: Run, provider: str) -> str:
+    """Return what a flow whose boundary layers are thinner than a cell does not know."""
+    of_a_cell = _reported(run, provider, "flow", CELL_REYNOLDS)
+    if of_a_cell is None or of_a_cell < UNRESOLVED:
+        return ""
+    return (
+        f" That of a cell is {_round(of_a_cell)}: boundary layers are thinner than a cell, and where the flow "
+        "leaves a smooth surface is not known; at edges it is."
     )
 
 
@@ -121,6 +133,7 @@ def _vortices(run: Run, volume: Volume) -> str:
         f"fluid turns by so much more than it strains; this level holds {SHARE:.0%} of all rotation of the "
         f"run. The colour is the vorticity about {axis}, the axis that most of it is about: red and blue "
         f"turn opposite ways. The log holds {len(volume.t)} frames.{_said(_reynolds(run, volume.provider))}"
+        f"{_thin_layers(run, volume.provider)}"
     )
     return _figure("Vortices", data, width, height, alternative, caption)
 

@@ -33,11 +33,11 @@ function formatter(row) {
   return (y) => y.toFixed(decimals).replace("-", "−");
 }
 
-// Ticks of a logarithmic axis at 1, 2 and 5 times the powers of ten.
+// Ticks of a logarithmic axis at 1, 2 and 5 times the powers of ten; at these alone where those would not fit.
 function decades([low, high]) {
-  const values = [];
+  const values = [], digits = high - low > 1.5 ? [1] : [1, 2, 5];
   for (let power = Math.floor(low); power <= high; power++) {
-    for (const digit of [1, 2, 5]) values.push(digit * 10 ** power);
+    for (const digit of digits) values.push(digit * 10 ** power);
   }
   return { tickvals: values, ticktext: values.map(String) };
 }
