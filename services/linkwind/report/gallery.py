@@ -54,8 +54,8 @@ def _thin_layers(run: Run, provider: str) -> str:
     if of_a_cell is None or of_a_cell < UNRESOLVED:
         return ""
     return (
-        f" That of a cell is {_round(of_a_cell)}: boundary layers are thinner than a cell, and where the flow "
-        "leaves a smooth surface is not known; at edges it is."
+        f" That of a cell is {_round(of_a_cell)}: boundary layers are thinner than a cell, and where the "
+        "flow leaves a smooth surface is not known; at edges it is."
     )
 
 
