@@ -111,7 +111,10 @@ def _lengths(value: Any) -> tuple[float, ...]:
     expected = "a list of 2 or 3 numbers"
     if not isinstance(value, list | tuple) or len(value) not in (2, 3):
         raise ProblemError.value(expected, value, "Write [width, height], or [width, height, depth].")
-    return numbers(value, expected)
+    found = numbers(value, expected)
+    if min(found) <= 0.0:
+        raise ProblemError.value(f"{expected} above 0", value, "Correct it.")
+    return found
 
 
 Lengths = Annotated[

@@ -78,8 +78,12 @@ def _problem(detail: ErrorDetails, path: Path, model: type[BaseModel]) -> Proble
         words = list(_kinds(_annotation(model, path)))
         return choice((*path, "type"), "one of", words, detail["input"]["type"])
     if kind == "literal_error":
-        words = re.findall(r"'([^']*)'", str(detail["ctx"]["expected"]))
-        return choice(path, "one of", words, detail["input"])
+        expected = str(detail["ctx"]["expected"])
+        words = re.findall(r"'([^']*)'", expected)
+        if words:
+            return choice(path, "one of", words, detail["input"])
+        numbers = "Write the number alone, without quotes." if isinstance(detail["input"], str) else ""
+        return Problem(path, expected, got, numbers or "Use one of these.")
     if kind in _LIMITS:
         words_of, key = _LIMITS[kind]
         limit = detail["ctx"][key]

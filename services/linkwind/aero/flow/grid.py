@@ -198,9 +198,9 @@ def _thickness(shape: AnyShape, dimensions: int) -> float:
 
 
 def _check_window(scenario: Scenario, provider: Provider, size: tuple[int, ...], grid: Grid) -> None:
-    least = 2 * grid.fringe + 16
     where = item(scenario, provider, "flow", "window")
-    for name, cells in zip(SIDES, size, strict=False):
+    for name, multiple, cells in zip(SIDES, MULTIPLE[grid.dimensions], size, strict=False):
+        least = math.ceil((2 * grid.fringe + 16) / multiple) * multiple
         if cells < least:
             raise ScenarioError(
                 f"{where}: expected a {name} of at least {least * grid.cell:.4g} m, {least} cells; got "

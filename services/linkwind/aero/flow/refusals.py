@@ -29,8 +29,9 @@ class Refusals:
 
     def overlap(self, t: float, bodies: list[str]) -> SimulationError:
         """A marker of these bodies lies on another."""
+        what = "outlines" if self._provider.flow.dimensions == 2 else "surfaces"
         return SimulationError(
-            f"{self._item('cells')}: t = {t:.6g} s: expected outlines at least a cell apart; got "
+            f"{self._item('cells')}: t = {t:.6g} s: expected {what} at least a cell apart; got "
             f"{_named(bodies)} on another. Bodies that touch need a joint between them, or more cells."
         )
 
