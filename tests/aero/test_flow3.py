@@ -166,9 +166,9 @@ def test_turning_everything_turns_the_forces(turn, shape):
 
 
 @pytest.mark.parametrize("axis", range(3))
-@pytest.mark.parametrize("shape", [PLATE, ROD], ids=["plate", "rod"])  # the markers of a ball are not their image
+@pytest.mark.parametrize("shape", [PLATE, ROD], ids=["plate", "rod"])
 def test_a_mirror_image_feels_the_mirror_image(axis, shape):
-    """These shapes are their own, so turns and torques, which are axial, are turned round where vectors stay."""
+    """The markers of these shapes are their own image; turns and torques, which are axial, are reversed."""
     mirror = np.eye(3)
     mirror[axis, axis] = -1.0
 

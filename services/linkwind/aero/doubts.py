@@ -9,11 +9,13 @@ from linkwind.aero.base import body_indices, item
 from linkwind.aero.flow import grid as grids
 from linkwind.scenario import Provider, Scenario
 from linkwind.scenario.providers import BEYOND_DEG, SEPARATES_DEG
+from linkwind.scenario.shapes import Plate
 
 WITHOUT_WIND = ("none", "field")  # models that read no wind from the scenario
 # Without the response a body wants so many times the mass of fluid that it accelerates, by the number of
 # lattice steps in a communication step; measured on free plates.
 WANTED = ((2, 1.0), (math.inf, 2.0))
+FEW = 10.0  # cells along the shorter side of a plate in space
 COARSE = 2.0  # panels that a wing goes in a step: above, lift after a sudden change is some percent off
 STEPS_A_GUST = 8.0  # that tell its shape: with fewer, a sine's largest value is missed by 8 % and more
 MANY_RINGS = 1500  # a step takes 0.6 s, and grows with the third power
@@ -28,6 +30,7 @@ def doubts(scenario: Scenario) -> Iterator[str]:
     for provider in scenario.providers:
         if provider.model == "flow":
             yield from _too_light(scenario, provider)
+            yield from _few_cells(scenario, provider)
         if provider.model == "vortex":
             yield from _of_rings(scenario, provider)
 
@@ -97,6 +100,26 @@ def _too_light(scenario: Scenario, provider: Provider) -> Iterator[str]:
                 f"{scenario.coupling.step:g} s, as here, that is stable for bodies of {wanted:g} times that "
                 f"mass and more. Should the run diverge, use at most {grid.step:.2g} s."
             )
+
+
+def _few_cells(scenario: Scenario, provider: Provider) -> Iterator[str]:
+    if provider.flow.dimensions == 2:
+        return
+    cell = grids.plan(scenario, provider).cell
+    plates = {body.name: body.shape for body in grids.bodies(scenario, provider)}
+    sides = {
+        name: min(shape.length, shape.span) / cell
+        for name, shape in plates.items()
+        if isinstance(shape, Plate)
+    }
+    name = min(sides, key=sides.__getitem__, default="")
+    if name and sides[name] < FEW:
+        yield (
+            f'{item(scenario, provider, "flow", "cells")}: the shorter side of "{name}" has '
+            f"{sides[name]:.3g} cells, and with less than {FEW:g} forces are far off: with 8 along their "
+            "chord a fruit fly's wings lift 0.6 of what they lift with 15. Use at least "
+            f"{math.ceil(FEW / sides[name] * provider.flow.cells - 1e-9)}."
+        )
 
 
 def _of_rings(scenario: Scenario, provider: Provider) -> Iterator[str]:
