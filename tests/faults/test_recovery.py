@@ -18,6 +18,7 @@ from linkwind.runs.run import run
 from linkwind.scenario import load
 from tests.faults.recovered import LONG, SIZE, child_of, cut, hit, hit_twice, killed, under_way, unharmed
 from tests.faults.test_processes import Programs, finish
+from tests.hinged import HINGED, STEP
 from tests.networks.namespaces import reason
 
 
@@ -53,6 +54,14 @@ def test_one_that_comes_back_is_killed_on_the_way(after: float, tmp_path: Path) 
 def test_a_flow_comes_back(tmp_path: Path) -> None:
     settings = ("time.end=0.12", "aero.flow.cells=32", "coupling.step=3e-5", "log.checkpoint_every=300")
     hit(tmp_path, signal.SIGKILL, 40_000_000, "two_link_flow", *settings)
+
+
+def test_a_flow_in_space_comes_back(tmp_path: Path) -> None:
+    """Its log of 1,500 steps and five checkpoints has 115 MB; it is killed after 40."""
+    scenario = tmp_path / "hinged.toml"
+    scenario.write_text(HINGED)
+    settings = (f"time.end={1500 * STEP!r}", "aero.flow.frames=10", "log.checkpoint_every=300")
+    hit(tmp_path, signal.SIGKILL, 40_000_000, str(scenario), *settings)
 
 
 def test_a_stopped_provider_is_ended_and_started_again(tmp_path: Path) -> None:

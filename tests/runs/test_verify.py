@@ -18,6 +18,7 @@ from linkwind.log.recover import recover
 from linkwind.runs.run import run
 from linkwind.runs.verify import Verified, scenario_of, verify
 from linkwind.scenario import builtin_names, load
+from tests.coarse import COARSE
 from tests.runs.edit import changed, rewrite
 
 STEPS = 30
@@ -25,7 +26,8 @@ STEPS = 30
 
 def fly(name: str, folder: Path, *settings: str) -> Path:
     end_ns = STEPS * load(name).coupling.step_ns
-    return run(load(name, [f"time.end={end_ns / 1e9!r}", *settings]), folder, lambda step: None).log
+    changes = [f"time.end={end_ns / 1e9!r}", *COARSE.get(name, ()), *settings]
+    return run(load(name, changes), folder, lambda step: None).log
 
 
 def check(log: Path, **options: bool) -> Verified:
@@ -42,14 +44,14 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_every_built_in_scenario_gives_the_same_bits_again(name: str, transport: str, tmp_path: Path) -> None:
     path = fly(name, tmp_path / "out", f"bus.transport={transport}")
     topics = open_log(path).topics
-    compared = ("/motion", "/wrench/aero", "/state", "/step", "/flow/aero", "/wake/aero")
+    compared = ("/motion", "/wrench/aero", "/state", "/step", "/flow/aero", "/wake/aero", "/volume/aero")
     of_run = sum(n for topic, n in topics.items() if topic in compared)
     found = check(path)
     assert (found.difference, found.remark, found.changed) == (None, "", {})
     assert (found.steps, found.messages) == (STEPS, of_run)
     found = check(path, from_recorded_wrenches=True)
     assert (found.difference, found.remark) == (None, "")
-    shown = topics.get("/flow/aero", 0) + topics.get("/wake/aero", 0)
+    shown = sum(topics.get(f"/{kind}/aero", 0) for kind in ("flow", "wake", "volume"))
     assert (found.steps, found.messages) == (STEPS, of_run - topics["/wrench/aero"] - shown)
 
 

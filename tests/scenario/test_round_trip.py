@@ -139,6 +139,7 @@ def test_builtin_names():
         "flapper_wake",
         "flutter",
         "four_bar",
+        "fruit_fly",
         "stage_separation",
         "two_link",
         "two_link_field",

@@ -17,10 +17,11 @@ from linkwind.runs.resume import plan, resume
 from linkwind.runs.run import run
 from linkwind.runs.verify import scenario_of, verify
 from linkwind.scenario import builtin_names, load
+from tests.coarse import COARSE
 
 LONG = os.environ.get("LINKWIND_LOGS") == "long"
 STEPS, CHECKPOINTS = (240, 6) if LONG else (20, 1)
-COARSEST = {"falling_plate": 32}
+COARSEST = {"falling_plate": 32, "fruit_fly": 24}
 
 
 def flows(name: str) -> bool:
@@ -34,6 +35,7 @@ def fly(name: str, folder: Path, transport: str) -> Log:
         f"time.end={STEPS * step_ns / 1e9!r}",
         f"log.checkpoint_every={STEPS // (CHECKPOINTS + 1) + 1}",
         f"bus.transport={transport}",
+        *COARSE.get(name, ()),
         *([f"aero.flow.cells={COARSEST.get(name, 16)}", "aero.flow.frames=0"] if flows(name) else []),
     ]
     return open_log(run(load(name, settings), folder, lambda step: None).log)

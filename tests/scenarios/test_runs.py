@@ -14,13 +14,15 @@ from linkwind.errors import InputError, SimulationError
 from linkwind.log.reader import open_log
 from linkwind.runs.run import Outcome, run
 from linkwind.scenario import builtin_names, load
+from tests.coarse import COARSE
 
 STEPS = 200
 
 
 def fly(name: str, folder: Path, *settings: str) -> Outcome:
     end_ns = STEPS * load(name).coupling.step_ns
-    return run(load(name, [f"time.end={end_ns / 1e9!r}", *settings]), folder, lambda step: None)
+    changes = [f"time.end={end_ns / 1e9!r}", *COARSE.get(name, ()), *settings]
+    return run(load(name, changes), folder, lambda step: None)
 
 
 @pytest.mark.parametrize("name", builtin_names())
