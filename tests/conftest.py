@@ -4,8 +4,13 @@ import pytest
 from hypothesis import settings
 
 FLOWS = (
-    "cylinder", "falling_plate", "flapper_wake", "fruit_fly", "two_link_flow_free", "vortex_induced_vibration",
-)  # fmt: skip
+    "cylinder",
+    "falling_plate",
+    "flapper_wake",
+    "fruit_fly",
+    "two_link_flow_free",
+    "vortex_induced_vibration",
+)
 SLOW = (
     "tests/bus/test_checkpoints.py::test_large",
     "tests/docker/test_stay.py",

@@ -1,4 +1,4 @@
-"""Runs in a flow of three dimensions: the same bits over both transports, again, from checkpoints, replayed."""
+"""Runs in a flow of three dimensions: the same bits on both transports, again, resumed, replayed."""
 
 from __future__ import annotations
 

@@ -9,7 +9,6 @@ from linkwind.aero.base import body_indices, item
 from linkwind.aero.flow import grid as grids
 from linkwind.scenario import Provider, Scenario
 from linkwind.scenario.providers import BEYOND_DEG, SEPARATES_DEG
-from linkwind.scenario.shapes import Plate
 
 WITHOUT_WIND = ("none", "field")  # models that read no wind from the scenario
 # Without the response a body wants so many times the mass of fluid that it accelerates, by the number of
@@ -106,11 +105,11 @@ def _few_cells(scenario: Scenario, provider: Provider) -> Iterator[str]:
     if provider.flow.dimensions == 2:
         return
     cell = grids.plan(scenario, provider).cell
-    plates = {body.name: body.shape for body in grids.bodies(scenario, provider)}
+    shapes = {body.name: body.shape for body in grids.bodies(scenario, provider)}
     sides = {
-        name: min(shape.length, shape.span) / cell
-        for name, shape in plates.items()
-        if isinstance(shape, Plate)
+        name: min(shape.reference_length, shape.span) / cell
+        for name, shape in shapes.items()
+        if shape is not None and not shape.closed
     }
     name = min(sides, key=sides.__getitem__, default="")
     if name and sides[name] < FEW:
