@@ -14,13 +14,12 @@ import numpy as np
 from linkwind.runs.validate.free import flown
 from linkwind.runs.validate.plate import EXACT
 from linkwind.runs.validate.rows import Findings, Row
-from linkwind.runs.validate.space.scenes import SPHERE, SPHERE_VOLUME, driven, plate, scene
+from linkwind.runs.validate.space.scenes import CALIBRATED, SPHERE, SPHERE_VOLUME, driven, plate, scene
 from linkwind.runs.validate.vortex.wings import ADDED, DNV
 from linkwind.scenario import loads
 from linkwind.spatial import Array
 
 SQUARE = plate(1.0, 1.0)
-CALIBRATED = ", calibrated on it"
 
 
 def accelerated(shape: str, cells: int, axis: int, side: float, steps: int) -> float:

@@ -19,6 +19,7 @@ SPHERE = '{ type = "ellipsoid", size = [1.0, 1.0, 1.0] }'
 SPHERE_VOLUME = math.pi / 6.0
 SPEED = 0.08  # cells a step of the stream: a Mach number of 0.14
 THREADS = 2
+CALIBRATED = "; markers are calibrated on it"  # where a row is no independent evidence
 
 Course = Callable[[float], tuple[Array, Array]]
 """Position [m] and rotation vector [rad], and twist [m/s, rad/s], at a time [s], each (6,)."""
