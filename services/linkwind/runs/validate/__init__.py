@@ -51,8 +51,8 @@ FLOW = Suite(
     ("plate normal to a stream", "falling plate", "sphere in a stream, convergence"),
     "In two dimensions a bluff plate at Re of 1000 and more has more drag than a real one, whose vortices "
     "break up along the span. After separation the motion of falling bodies is chaotic: means and early "
-    "windows are compared, never late trajectories. In space the windows are some 10 lengths long, which adds "
-    "some per cent to the drag of a sphere; where markers lie was fitted to some of the rows, which say so.",
+    "windows are compared, never late trajectories. In space the windows are some 10 lengths long, which "
+    "adds some per cent to drag; where markers lie was fitted to some of the rows, which say so.",
 )
 
 COUPLING = Suite(
