@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from linkwind.cli import app
 from linkwind.errors import InputError
-from linkwind.runs.validate import COUPLING, MULTIBODY, VORTEX, page
+from linkwind.runs.validate import COUPLING, FLOW, MULTIBODY, VORTEX, page
 from linkwind.runs.validate.multibody import elliptic
 from linkwind.runs.validate.rows import Findings, Row, most, near
 from linkwind.runs.validate.vortex import exact, flutter, surface
@@ -73,6 +73,14 @@ CHEAP = (
 @pytest.mark.parametrize("name", CHEAP)
 def test_multibody(name):
     (found,) = MULTIBODY.run(True, (name,))
+    assert found.rows
+    for row in found.rows:
+        assert row.ok, row
+
+
+@pytest.mark.parametrize("name", ["impulse balance in space", "carried by the stream in space"])
+def test_flow_in_space(name):
+    (found,) = FLOW.run(True, (name,))
     assert found.rows
     for row in found.rows:
         assert row.ok, row

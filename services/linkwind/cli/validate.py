@@ -35,7 +35,7 @@ def register(app: typer.Typer) -> None:
 
 
 def flow(
-    short: Annotated[bool, typer.Option("--short", help="A coarser form, some 2 minutes.")] = False,
+    short: Annotated[bool, typer.Option("--short", help="A coarser form, some 90 seconds.")] = False,
     case: CaseOption = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Folder for flow.html: the table and plots.")
@@ -44,7 +44,7 @@ def flow(
 ) -> None:
     """Compare the model flow with published and exact values; exit code 5 if one is off.
 
-    All of it takes some 6 minutes on two cores.
+    All of it takes some 12 minutes on two cores, half of it the flow in three dimensions.
 
     Example: linkwind validate flow --short --out validation
     """
