@@ -6,7 +6,7 @@ import numpy as np
 
 from linkwind import aero
 from linkwind.runs.validate.scenes import communication_step
-from linkwind.runs.validate.space import text as scene
+from linkwind.runs.validate.space.scenes import scene
 from linkwind.scenario import loads
 from linkwind.spatial import Motion, Wrench
 
