@@ -126,6 +126,7 @@ mass = 1.0
 inertia = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
 shape = { type = "ellipsoid", size = [0.8, 0.5, 0.5] }
 """
+PROVIDER = '[[providers]]\nbodies = ["body", "other"]\n'
 FREE = SECOND.replace("other", "third")
 ALONG, AT_REST = np.eye(6)[0], np.zeros((3, 6))
 
@@ -164,6 +165,24 @@ def test_bodies_on_one_another_are_named(one, other):
     assert f"{ITEM}.cells: t = 0 s: expected surfaces at least a cell apart" in message
     assert any(f'got "{names[k]}" on another' in message for k in (one, other))
     assert not any(f'"{name}"' in message for k, name in enumerate(names) if k not in (one, other))
+
+
+def test_bodies_that_joints_connect_over_one_without_a_shape_may_touch():
+    """As the root of a wing that sweeps on a hinge of its own, and the thorax."""
+    ends = ("body", "hinge"), ("hinge", "other")
+    joints = "".join(
+        f'[[joints]]\nname = "{child}"\ntype = "revolute"\nparent = "{parent}"\nchild = "{child}"\n'
+        for parent, child in ends
+    )
+    hinge = SECOND.split("shape")[0].replace("other", "hinge")
+    scene = text(window=(6.4, 6.4, 6.4), rest=joints).replace("[[providers]]\n", hinge + SECOND + PROVIDER, 1)
+    place = np.zeros((3, 6))
+    place[2, 2] = 0.5  # the ball reaches from 0.25 to 0.75, the plate to 0.45
+    found = Driven(scene).model
+    found.evaluate(0.0, motion(place, AT_REST), Wrench.zeros(2))
+    free = Driven(scene.replace('parent = "hinge"', 'parent = "world"')).model
+    with pytest.raises(SimulationError, match="expected surfaces at least a cell apart"):
+        free.evaluate(0.0, motion(place, AT_REST), Wrench.zeros(2))
 
 
 def test_a_body_that_becomes_too_fast():

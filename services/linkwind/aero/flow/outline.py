@@ -78,11 +78,23 @@ def markers(bodies: list[Body], joints: list[Joint], cell: float, viscosity: flo
 
 
 def joined(bodies: list[Body], joints: list[Joint]) -> Indices:
-    """Return which bodies may touch, because there is a joint between them, shape (n, n)."""
-    pairs = {(joint.parent, joint.child) for joint in joints}
-    return np.array(
-        [[(a.name, b.name) in pairs or (b.name, a.name) in pairs for b in bodies] for a in bodies], np.int32
-    )
+    """Return which bodies may touch, shape (n, n): there are joints between them, and no body of the flow."""
+    beside: dict[str, set[str]] = {}
+    for joint in joints:
+        if joint.parent != "world":
+            beside.setdefault(joint.parent, set()).add(joint.child)
+            beside.setdefault(joint.child, set()).add(joint.parent)
+    names = [body.name for body in bodies]
+
+    def reached(start: str) -> set[str]:
+        found, ahead = {start}, [start]
+        while ahead:
+            new = beside.get(ahead.pop(), set()) - found
+            found |= new
+            ahead += [name for name in new if name not in names]
+        return found - {start}
+
+    return np.array([[name in found for name in names] for found in map(reached, names)], np.int32)
 
 
 def _link(following: list[int], chain: list[int]) -> None:

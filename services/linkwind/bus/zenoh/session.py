@@ -24,7 +24,7 @@ LAST_PORT = 65535
 LEASE = 1.0  # s without a sign of life after which a participant counts as lost
 
 # bytes of a message, which wait in memory until it is whole; what is larger is dropped
-LARGEST = 2**28  # of any: the memory of a flow of 7 million cells
+LARGEST = 2**28  # of any: the memory of a flow of 7 million cells, of one in space of half as many
 LARGEST_REQUEST = 2**16  # of a control request; the answer may be as large as a model's memory
 LARGEST_FAULT = 2**16
 LARGEST_MOTION = 2**24  # 30,000 bodies; a provider does not know how many there are before it has joined
