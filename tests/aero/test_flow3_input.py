@@ -27,6 +27,7 @@ from tests.aero.flows3 import (
 ITEM = 'providers[0] "fluid".flow'
 FLAT_BALL = '{ type = "ellipsoid", size = [1.0, 1.0, 0.2] }'
 COIN = '{ type = "circle", diameter = 1.0, span = 0.25 }'
+LONG = '{ type = "circle", diameter = 0.2 }'  # its span is 1 m unless it says another
 WEDGE = '{ type = "polygon", points = [[0.5, 0.0], [-0.5, 0.1], [-0.5, -0.1]], span = 1.0 }'
 
 
@@ -62,16 +63,30 @@ def test_too_many_cells():
 
 @pytest.mark.parametrize(
     ("shape", "got"),
-    [(FLAT_BALL, "10 along, 2 across"), (COIN, "10 along, 2.5 across"), (WEDGE, "10 along, 0.995 across")],
-    ids=["flat ball", "along z", "wedge"],
+    [
+        (FLAT_BALL, "10 along, 2 across"),
+        (COIN, "10 along, 2.5 across"),
+        (LONG, "10 along its span, 1 m, 2 across"),
+        (WEDGE, "10 along, 0.995 across"),
+    ],
+    ids=["flat ball", "along z", "long", "wedge"],
 )
 def test_closed_shapes_that_are_thin_along_any_axis(shape, got):
-    need = math.ceil(4 * CELLS / float(got.split()[2]))
+    need = math.ceil(4 * CELLS / float(got.split()[-2]))
     refused(
         f'{ITEM}.cells: expected 8 cells along and 4 across "body"; got {got}. Use at least {need}.',
         shape=shape,
     )
     driven(shape=shape, cells=need)
+
+
+def test_a_viscosity_that_single_precision_does_not_know():
+    refused(
+        "scene.toml: environment.viscosity: expected at least 1e-07 cells² a lattice step, here 2e-07 m²/s; "
+        "got 1e-09 m²/s. Make it larger.",
+        viscosity=1e-9,
+    )
+    driven(viscosity=2e-7).go(still(), 2)
 
 
 def test_a_body_with_too_few_cells_along_it():

@@ -9,6 +9,7 @@ import numpy as np
 
 from linkwind.aero.base import body_indices, item
 from linkwind.errors import ScenarioError
+from linkwind.native.lattice import shear_rate
 from linkwind.scenario import Provider, Scenario
 from linkwind.scenario.bodies import Body
 from linkwind.scenario.shapes import AnyShape, Circle, Ellipse, Ellipsoid, Rectangle, signed_area
@@ -26,6 +27,7 @@ SIDES = ("width", "height", "depth")
 ASIDE = 0.1  # share of the window by which the mechanism stands upstream of its middle
 THINNEST = 4.0  # cells across a closed shape
 SHORTEST = 8.0  # cells along a body
+VISCOSITY = 1e-7  # cells² a step; what is much less is none in single precision
 MAX_SUBSTEPS = 256  # lattice steps in a communication step
 
 
@@ -88,7 +90,7 @@ def plan(scenario: Scenario, provider: Provider) -> Grid:
     """Return the grid for a scenario.
 
     Raises:
-        ScenarioError: it would be too coarse, or its steps too many.
+        ScenarioError: it would be too coarse, its steps too many, or its viscosity too small.
     """
     flow, environment, acted = provider.flow, scenario.environment, bodies(scenario, provider)
     dimensions = flow.dimensions
@@ -107,10 +109,12 @@ def plan(scenario: Scenario, provider: Provider) -> Grid:
             "or fewer cells."
         )
     span = next(body.shape.span for body in acted if body.shape) if dimensions == 2 else 1.0
-    return Grid(
+    grid = Grid(
         cell, step / substeps, substeps, length, _place(scenario, dimensions), environment.density * span,
         environment.viscosity, wind,
     )  # fmt: skip
+    _check_viscosity(scenario, grid)
+    return grid
 
 
 def extent(body: Body, dimensions: int) -> float:
@@ -175,12 +179,23 @@ def _check_resolution(scenario: Scenario, provider: Provider, acted: list[Body],
         along = extent(body, provider.flow.dimensions) / cell
         need = max(THINNEST / across, SHORTEST / along)
         if need > 1.0:
-            got = f"{along:.3g} along" + (f", {across:.3g} across" if shape.closed else "")
+            spanwise = provider.flow.dimensions == 3 and shape.span > shape.reference_length
+            got = f"{along:.3g} along" + (f" its span, {shape.span:g} m" if spanwise else "")
+            got += f", {across:.3g} across" if shape.closed else ""
             raise ScenarioError(
                 f"{item(scenario, provider, 'flow', 'cells')}: expected {SHORTEST:g} cells along and "
                 f'{THINNEST:g} across "{body.name}"; got {got}. '
                 f"Use at least {math.ceil(need * provider.flow.cells)}."
             )
+
+
+def _check_viscosity(scenario: Scenario, grid: Grid) -> None:
+    if not np.float32(shear_rate(grid.lattice_viscosity)) < 2.0:
+        least = VISCOSITY * grid.cell**2 / grid.step
+        raise ScenarioError(
+            f"{scenario.source}: environment.viscosity: expected at least {VISCOSITY:g} cells² a lattice "
+            f"step, here {least:.2g} m²/s; got {grid.viscosity:g} m²/s. Make it larger."
+        )
 
 
 def _thickness(shape: AnyShape, dimensions: int) -> float:
