@@ -117,23 +117,32 @@ static void add_wrench(double *wrench, lw_vec3 force, lw_vec3 arm) {
     lw_store3(wrench + 3, lw_add(lw_load3(wrench + 3), lw_cross(arm, force)));
 }
 
+/* Which way a filament is pulled in the plane of its surface: across itself, along the chord without sweep. */
+static lw_vec3 pull_of(const lw_vortex *v, int32_t first, const lw_bearer *f, lw_mat3 turn) {
+    const lw_vec3 from = lw_load3(v->corner + 3 * (first + f->from)), to = lw_load3(v->corner + 3 * (first + f->to));
+    const lw_vec3 along = lw_sub(to, from);
+    const double length = sqrt(along.x * along.x + along.z * along.z);
+    return lw_mat_vec(turn, lw_vec(along.z / length, 0.0, -along.x / length));
+}
+
 /* Add the force of velocity and strength on every filament, rho gamma u x l, to wrench (n, 6). What those across
- * the chord bear along it is the suction of the leading edge: elsewhere it is next to nothing. */
+ * the chord bear in the plane of the surface is the suction of the leading edge: elsewhere it is next to nothing. */
 static void steady_wrench(const lw_vortex *v, const double *pose, const double *strength,
                           double *const middle[3], double *const velocity[3], double *wrench) {
     const lw_sizes z = lw_sizes_of(v);
     for (int32_t b = 0; b < v->surfaces; ++b) {
         const double *placed = v->placed + 3 * b * z.corners;
         const lw_mat3 turn = lw_quat_matrix(lw_load4(pose + 7 * b + 3));
-        const lw_vec3 chord = lw_vec(turn.xx, turn.yx, turn.zx);
         for (int32_t k = 0; k < z.bearers; ++k) {
             const lw_bearer f = lw_filament_of(v, b, k);
             const int32_t target = v->surfaces * z.rings + b * z.bearers + k;
             const lw_vec3 along = lw_sub(lw_load3(placed + 3 * f.to), lw_load3(placed + 3 * f.from));
             const lw_vec3 arm = lw_sub(lw_at(middle, target), lw_load3(pose + 7 * b));
             lw_vec3 force = lw_cross(lw_at(velocity, target), along);
-            if (k < z.spanwise)
-                force = lw_sub(force, lw_scale((1.0 - v->suction) * lw_dot(force, chord), chord));
+            if (k < z.spanwise) {
+                const lw_vec3 pull = pull_of(v, b * z.corners, &f, turn);
+                force = lw_sub(force, lw_scale((1.0 - v->suction) * lw_dot(force, pull), pull));
+            }
             add_wrench(wrench + 6 * b, lw_scale(v->density * lw_net(strength, &f), force), arm);
         }
     }

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
-from linkwind.aero.base import body_indices, item
+from linkwind.aero.base import item
 from linkwind.aero.flow import grid as grids
+from linkwind.aero.planform import mean_chord, thin
 from linkwind.scenario import Provider, Scenario
 from linkwind.scenario.providers import BEYOND_DEG, SEPARATES_DEG
 
@@ -131,10 +132,7 @@ def _of_rings(scenario: Scenario, provider: Provider) -> Iterator[str]:
             "that, or use fewer rings."
         )
     speeds = [math.dist(wind, body.velocity or (0.0, 0.0, 0.0)) for body in scenario.bodies]
-    chord = min(
-        getattr(scenario.bodies[index].shape, "length", math.inf)
-        for index in body_indices(scenario, provider)
-    )
+    chord = min(map(mean_chord, thin(scenario, provider)))
     far = max(speeds) * scenario.coupling.step / chord  # chords in a step, at the start
     if far * settings.chordwise > COARSE:
         yield (

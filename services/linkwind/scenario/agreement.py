@@ -11,6 +11,7 @@ import numpy as np
 from linkwind.scenario.problems import Path, Problem, choice, show
 from linkwind.scenario.providers import ADDING_INERTIA
 from linkwind.scenario.settings import nanoseconds
+from linkwind.scenario.shapes import Plate, Wing
 
 if TYPE_CHECKING:
     from linkwind.scenario.bodies import Body, Joint
@@ -175,13 +176,7 @@ def _provider_model(scenario: Scenario, provider: Provider, path: Path) -> Itera
         advice = f'Add a table for a body, such as {_first(provider.bodies)}, with fx = "…".'
         yield Problem((*path, "field"), expected, "nothing", advice)
     if provider.model in ("plate", "vortex"):
-        for index, body in enumerate(scenario.bodies):
-            if body.name in provider.bodies and (body.shape is None or body.shape.type != "plate"):
-                expected = f'a plate, which the model of provider "{provider.name}" needs'
-                got = f'type "{body.shape.type}"' if body.shape else "nothing"
-                advice = f'{"Write" if body.shape else "Add"} shape = {{ type = "plate", length = … }}.'
-                yield Problem(("bodies", index, "shape"), expected, got, advice)
-
+        yield from _thin(scenario, provider)
     for name in provider.vortex.trailing_edge:
         if name not in provider.bodies:
             yield choice((*path, "vortex", "trailing_edge", name), "one of its bodies", provider.bodies, name)
@@ -191,6 +186,23 @@ def _provider_model(scenario: Scenario, provider: Provider, path: Path) -> Itera
         )
     if provider.model == "flow":
         yield from _flow(scenario, provider, path)
+
+
+def _thin(scenario: Scenario, provider: Provider) -> Iterator[Problem]:
+    """Plates and wings, each of one chord at any place of its span."""
+    for index, body in enumerate(scenario.bodies):
+        shape = body.shape
+        if body.name not in provider.bodies:
+            continue
+        if not isinstance(shape, Plate | Wing):
+            expected = f'a plate or a wing, which the model of provider "{provider.name}" needs'
+            got = f'type "{shape.type}"' if shape else "nothing"
+            advice = f'{"Write" if shape else "Add"} shape = {{ type = "plate", length = … }}.'
+            yield Problem(("bodies", index, "shape"), expected, got, advice)
+        elif isinstance(shape, Wing) and (z := shape.folds) is not None:
+            expected = f'one chord at each z, which the model of provider "{provider.name}" needs'
+            advice = "Cut it along its chord into bodies on fixed joints."
+            yield Problem(("bodies", index, "shape", "points"), expected, f"more at z = {z:.6g}", advice)
 
 
 def _flow(scenario: Scenario, provider: Provider, path: Path) -> Iterator[Problem]:

@@ -172,8 +172,8 @@ SEPARATES_DEG, BEYOND_DEG = 15.0, 20.0
 class VortexModel(Section):
     """Settings of the flow around thin wings in three dimensions: vortex rings, and wakes of them."""
 
-    chordwise: int = Field(default=6, ge=1, le=100, description="Rings along the chord of each plate")
-    spanwise: int = Field(default=12, ge=1, le=200, description="Rings along the span of each plate")
+    chordwise: int = Field(default=6, ge=1, le=100, description="Rings along the chord of each plate or wing")
+    spanwise: int = Field(default=12, ge=1, le=200, description="Rings along the span of each plate or wing")
     wake: int = Field(
         default=100,
         ge=1,
@@ -181,7 +181,7 @@ class VortexModel(Section):
         description="Rows of rings that each wake keeps; one is shed in a communication step",
     )
     core: float = quantity(
-        "Radius of the cores of the wakes' vortices, in chords of the shortest plate",
+        "Radius of the cores of the wakes' vortices, in mean chords of the shortest plate or wing",
         "1",
         0.05,
         gt=0.0,
@@ -189,7 +189,7 @@ class VortexModel(Section):
     )
     suction: float = quantity(
         "Share of the suction of the leading edges that is there: 1 for round ones, 0 for sharp ones, where "
-        "the force stands across the plate",
+        "the force stands across the wing",
         "1",
         1.0,
         ge=0.0,
@@ -197,8 +197,8 @@ class VortexModel(Section):
     )
     trailing_edge: dict[str, Literal["+x", "-x"]] = Field(
         default={},
-        description="Which edge of a plate sheds its wake, by body, in its frame; default: the downstream "
-        "one at the start",
+        description="Which edge of a plate or wing sheds its wake, by body, in its frame; default: the "
+        "downstream one at the start",
     )
     frames: int = Field(default=48, ge=0, le=10000, description="Pictures of the wakes in the log of a run")
     threads: int = Field(

@@ -7,6 +7,7 @@ not repeated; the body reaches half its ``span`` to each side of that plane, as 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -237,6 +238,13 @@ class Wing(Section):
         """Return ``n`` points of its view along the span, a line [m], shape (n, 2)."""
         x = np.array(self.points)[:, 0]
         return np.column_stack([np.linspace(x.min(), x.max(), n), np.zeros(n)])
+
+    @property
+    def folds(self) -> float | None:
+        """Place along the span at which a line along the chord meets the wing twice [m]; None without."""
+        levels = sorted({z for _, z in self.points})
+        between = [0.5 * (low + high) for low, high in pairwise(levels)]
+        return next((z for z in between if self.chord(z) is None), None)
 
     def chord(self, z: float) -> tuple[float, float] | None:
         """Return where a line along the chord enters and leaves the wing [m].

@@ -9,7 +9,8 @@ import struct
 import numpy as np
 
 from linkwind.aero.base import Capabilities, body_indices, item
-from linkwind.aero.vortex.surface import plates, surfaces, trailing
+from linkwind.aero.planform import ends_and_middle, mean_chord, thin
+from linkwind.aero.vortex.surface import middles, surfaces, trailing
 from linkwind.aero.wind import wind_table
 from linkwind.errors import ProtocolError, SimulationError
 from linkwind.frames import Single, WakeFrame, logged
@@ -38,13 +39,15 @@ class Vortex:
     """
 
     def __init__(self, scenario: Scenario, provider: Provider) -> None:
-        """Take the plates; the rings are laid when the first motion tells where the air comes from.
+        """Take the wings; the rings are laid when the first motion tells where the air comes from.
 
         Raises:
-            ScenarioError: a body is no plate.
+            ScenarioError: a body is neither plate nor wing.
         """
         self._scenario, self._provider = scenario, provider
-        self._size = plates(scenario, provider)
+        self._wings = thin(scenario, provider)
+        self._chords = [mean_chord(wing) for wing in self._wings]
+        self._places = [ends_and_middle(wing) for wing in self._wings]
         self._rows = np.array(body_indices(scenario, provider))
         self._wind = wind_table(scenario.environment)
         self._h = scenario.coupling.step_ns / 1e9
@@ -157,9 +160,9 @@ class Vortex:
     def _made(self, t: float, motion: Motion) -> VortexLattice:
         if self._lattice is not None:
             return self._lattice
-        at_rest = np.zeros(3)
-        wind = np.array([wind_at(self._wind, t, motion.position[body], at_rest)[0] for body in self._rows])
-        return self._lay(trailing(self._scenario, self._provider, motion, wind))
+        arms = middles(self._wings, motion.rotation()[self._rows])
+        wind = np.array([self._air(t, place) for place in motion.position[self._rows] + arms])
+        return self._lay(trailing(self._scenario, self._provider, motion, arms, wind))
 
     def _lay(self, sides: Array) -> VortexLattice:
         table = surfaces(self._scenario, self._provider, sides)
@@ -184,19 +187,22 @@ class Vortex:
             )
         return lattice
 
+    def _air(self, t: float, place: Array) -> Array:
+        return wind_at(self._wind, t, place, np.zeros(3))[0]
+
     def _incidence(self, t: float, motion: Motion) -> tuple[float, float]:
         """Return the largest angle of attack [deg], and the most panels that a point goes in a step."""
         largest, farthest = 0.0, 0.0
-        axes = motion.rotation()[self._rows]
-        for body, plate, (x, y, z) in zip(self._rows, self._size, np.swapaxes(axes, 1, 2), strict=True):
-            wind = wind_at(self._wind, t, motion.position[body], np.zeros(3))[0]
+        axes = np.swapaxes(motion.rotation()[self._rows], 1, 2)
+        for body, chord, places, (x, y, z) in zip(self._rows, self._chords, self._places, axes, strict=True):
+            arms = places[:, :1] * x + places[:, 1:] * z
+            wind = self._air(t, motion.position[body] + arms[1])
             speed, angle = 0.0, 0.0
-            for place in (-0.5, 0.0, 0.5):
-                arm = np.cross(motion.angular[body], place * plate.span * z)
-                air = (wind - motion.linear[body] - arm).tolist()
+            for arm in arms:
+                air = (wind - motion.linear[body] - np.cross(motion.angular[body], arm)).tolist()
                 along, across = (sum(a * b for a, b in zip(air, e.tolist(), strict=True)) for e in (x, y))
                 if math.hypot(along, across) > speed:
                     speed, angle = math.hypot(along, across), math.atan2(abs(across), abs(along))
             largest = max(largest, math.degrees(angle))
-            farthest = max(farthest, speed * self._h * self._provider.vortex.chordwise / plate.length)
+            farthest = max(farthest, speed * self._h * self._provider.vortex.chordwise / chord)
         return largest, farthest
