@@ -130,7 +130,12 @@ def test_a_force_that_is_none_ends_the_run():
     [
         (
             ['bodies.wing.shape={type="circle",diameter=0.4}'],
-            'a plate, which the model of provider "aero" needs',
+            'a plate or a wing, which the model of provider "aero" needs',
+        ),
+        (
+            ['bodies.wing.shape={type="wing",points=[[0,0],[2,0],[2,1],[1,0.4],[0,1]]}'],
+            'points: expected one chord at each z, which the model of provider "aero" needs; got more at z = '
+            "0.7. Cut it along its chord into bodies on fixed joints.",
         ),
         (["environment.density=0"], "environment.density: expected a number above 0 for the model vortex"),
         (['aero.vortex.trailing_edge.wig="+x"'], 'expected one of its bodies wing; got "wig". Use "wing"'),
@@ -182,3 +187,83 @@ def test_verify_and_resume_give_the_same_bits(tmp_path):
     resumed = linkwind.resume(whole.log, tmp_path / "resumed", from_step=6)
     path = linkwind.open_log(resumed.log).trajectory()
     assert hashlib.sha256(path.position.tobytes()).digest() == digest
+
+
+# ---- wings of any planform ----
+
+RECTANGLE = 'bodies.wing.shape={type="wing",points=[[-0.2,-0.6],[0.2,-0.6],[0.2,0.6],[-0.2,0.6]]}'
+SWEPT = 'bodies.wing.shape={type="wing",points=[[-0.2,-0.5],[0.2,-0.5],[0.6,0.5],[0.2,0.5]]}'
+TURNING = {"linear": (0.1, 0.3, -0.2), "angular": (0.4, -0.3, 0.5), "angle": 0.1}
+
+
+@pytest.mark.parametrize("edge", ["+x", "-x"])
+def test_a_rectangle_has_the_bits_of_a_plate(edge):
+    trails = f'aero.vortex.trailing_edge.wing="{edge}"'
+    plate, wing = made(trails), made(trails, RECTANGLE)
+    for t in (0.0, 0.02, 0.04):
+        motion, expected = ask(plate, t, **TURNING)
+        _, found = ask(wing, t, **TURNING)
+        for name in ("force", "torque", "response", "diagnostics"):
+            assert getattr(found, name).tobytes() == getattr(expected, name).tobytes()
+        plate.commit(t, motion)
+        wing.commit(t, motion)
+    assert wing.save() == plate.save()
+
+
+def test_rings_of_a_pointed_wing_lie_within_it():
+    model = made('bodies.wing.shape={type="wing",points=[[-0.4,0],[0.2,0.6],[0.2,-0.6]]}')
+    ask(model, 0.0)
+    x, _, z = np.moveaxis(model.lattice.table.corner[0], -1, 0)
+    chord = 0.6 - np.abs(z[0])
+    np.testing.assert_allclose(x[0], 0.2 - chord + 0.25 * chord / 3, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(np.diff(x, axis=0), np.tile(chord / 3, (3, 1)), rtol=1e-12)
+    assert chord.min() == pytest.approx(0.25 * 1.2 / 4.5)
+    assert model.lattice.table.core == pytest.approx(0.05 * 0.3)  # of the mean chord
+
+
+def test_a_sharp_leading_edge_leaves_nothing_along_the_chord_of_a_swept_wing():
+    """What it takes away is across the edge, which runs along (0.4, 0, 1)."""
+    forces = []
+    for suction in (1.0, 0.0):
+        model = made(SWEPT, f"aero.vortex.suction={suction}")
+        forces.append(ask(model, 0.0)[1].force[0])
+    round_, sharp = forces
+    assert abs(sharp[0]) < 1e-15 * sharp[1] < abs(round_[0])
+    pull = round_ - sharp
+    assert pull[0] < 0.0 < pull[2]
+    assert abs(pull @ [0.4, 0.0, 1.0]) < 1e-12 * np.linalg.norm(pull)
+
+
+def test_a_wing_away_from_the_centre_of_mass_meets_the_air_where_it_is():
+    """A blade 2 m from its hub that turns at 3 rad/s about y: 6 m/s at its middle, 7.8 m/s at its tip."""
+    blade = 'bodies.wing.shape={type="wing",points=[[-0.2,1.4],[0.2,1.4],[0.2,2.6],[-0.2,2.6]]}'
+    for spin, front in ((3.0, 1.0), (-3.0, -1.0)):
+        model = made(blade, "environment.wind=[0,0.3,0]")
+        _, wrench = ask(model, 0.0, angular=(0.0, spin, 0.0))
+        assert np.sign(model.lattice.table.corner[0, 0, 0, 0]) == front
+        incidence, advance, _ = wrench.diagnostics
+        assert incidence == pytest.approx(np.degrees(np.arctan2(0.3, 7.8)))
+        assert advance == pytest.approx(np.hypot(7.8, 0.3) * 0.02 * 3 / 0.4)
+
+
+ARM = np.array([0.3, 0.0, 0.4])
+ON_AN_ARM = (ARM[[0, 2]] + [[-0.2, -0.6], [0.2, -0.6], [0.2, 0.6], [-0.2, 0.6]]).tolist()
+MOVED = f'bodies.wing.shape={{type="wing",points={ON_AN_ARM}}}'
+
+
+def test_a_wing_on_an_arm_bears_the_forces_of_a_plate_that_is_there():
+    """F = F', T = T' + r × F', and Gᵀ alike, with the velocity v + ω × r."""
+    wing, plate = made(MOVED), made()
+    motion, found = ask(wing, 0.0, **TURNING)
+    axes = motion.rotation()[0]
+    arm = axes @ ARM
+    _, expected = ask(
+        plate, 0.0, **{**TURNING, "linear": motion.linear[0] + np.cross(motion.angular[0], arm)}
+    )
+    np.testing.assert_allclose(found.force, expected.force, rtol=0, atol=1e-12)
+    torque = expected.torque[0] + np.cross(arm, expected.force[0])
+    np.testing.assert_allclose(found.torque[0], torque, rtol=0, atol=1e-12)
+    moved = np.eye(6)
+    moved[:3, 3:] = -np.cross(np.eye(3), arm)
+    response = moved.T @ expected.response @ moved
+    np.testing.assert_allclose(found.response, response, rtol=0, atol=1e-12)

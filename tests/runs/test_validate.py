@@ -113,6 +113,13 @@ def test_sections_are_those_of_scipy_s_functions():
     assert exact.sears(k) == pytest.approx(bent, rel=1e-13)
 
 
+def test_horseshoes_find_the_published_lift_of_a_square_wing():
+    """1.4602 (E. O. Tuck 1993), in the first quarter of the chord."""
+    lift, place = surface.swept(np.zeros(2), np.ones(2), 0.5)
+    assert lift == pytest.approx(1.4602, rel=2e-3)
+    assert 0.15 < place < 0.25
+
+
 def test_sections_have_their_limits():
     slow = exact.loads(1e-4, 0.0, 0.02)  # a plate at rest: 2 pi, at the quarter of the chord, without drag
     assert slow.lift.real == pytest.approx(np.pi * 0.02, rel=1e-3)

@@ -155,9 +155,8 @@ WRONG = [
      'joints[0] "hinge".parent: expected another body than the child; got "link1". '
      "Name the body that carries it, or world."),
     # what a model needs
-    (PLATE, "", 'bodies[0] "link1".shape: expected a plate, which the model of provider "aero" needs; '
-     'got nothing. '
-     'Add shape = { type = "plate", length = … }.'),
+    (PLATE, "", 'bodies[0] "link1".shape: expected a plate or a wing, which the model of provider "aero" '
+     'needs; got nothing. Add shape = { type = "plate", length = … }.'),
     ('model = "plate"', 'model = "field"',
      "aero.field: expected a table for at least one body; got nothing. "
      'Add a table for a body, such as link1, with fx = "…".'),

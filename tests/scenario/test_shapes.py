@@ -152,8 +152,8 @@ def test_the_plate_model_names_what_it_got():
     with pytest.raises(ScenarioError) as error:
         loads(edited(PLATE, 'shape = { type = "circle", diameter = 0.5 }', TWO_LINK), "two_link.toml")
     assert str(error.value) == (
-        'two_link.toml: bodies[0] "link1".shape: expected a plate, which the model of provider "aero" needs; '
-        'got type "circle". Write shape = { type = "plate", length = … }.'
+        'two_link.toml: bodies[0] "link1".shape: expected a plate or a wing, which the model of provider '
+        '"aero" needs; got type "circle". Write shape = { type = "plate", length = … }.'
     )
 
 

@@ -38,7 +38,7 @@ def surfaces(scenario: Scenario, provider: Provider, sides: Array) -> SurfaceTab
     corner, control = np.zeros((len(wings), c + 1, s + 1, 3)), np.zeros((len(wings), c, s, 3))
     for i, (wing, side) in enumerate(zip(wings, sides.tolist(), strict=True)):
         width = wing.span / (s + 0.5)
-        edges: Array = ends(wing)[0] + width * (np.arange(s + 1) + 0.25)
+        edges = np.asarray(ends(wing)[0] + width * (np.arange(s + 1) + 0.25), np.float64)
         ahead, chords = _chords(wing, side, edges)
         panel = chords / c
         corner[i, ..., 0] = side * (panel * (np.arange(c + 1) + 0.25)[:, None] - ahead)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from linkwind.spatial import Array
+
 SPAN = 1e4  # of a plate in two dimensions: a single ring, whose ends are felt by 1e-4 of the span alone
 WIDTH = SPAN / 1.5  # of that ring
 
@@ -15,6 +17,7 @@ def wing(
     wind: float = 1.0,
     core: float = 0.01,
     gust: str = "",
+    planform: Array | None = None,
 ) -> str:
     """Return the scenario of one plate as TOML.
 
@@ -26,7 +29,11 @@ def wing(
         wind: along x; 0 where the plate goes through air at rest.
         core: radius of the wake's cores; small, for it is no part of the theories.
         gust: keys of a gust.
+        planform: corners (x, z) of a wing in place of the plate, shape (corners, 2).
     """
+    shape = f'type = "plate", length = 1.0, span = {span!r}'
+    if planform is not None:
+        shape = f'type = "wing", points = {planform.tolist()}'
     return f"""
 [time]
 end = {step!r}
@@ -40,7 +47,7 @@ name = "wing"
 mass = 1.0
 inertia = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
 position = [0.0, 0.0, 0.0]
-shape = {{ type = "plate", length = 1.0, span = {span!r} }}
+shape = {{ {shape} }}
 [aero]
 model = "vortex"
 [aero.vortex]

@@ -17,11 +17,17 @@ from linkwind.spatial import Array
 TUCK = "E. O. Tuck, J. Austral. Math. Soc. B 35(2), 1993"
 OWN = "a lattice written apart, spaced by cosines"
 DNV = "DNV-RP-C205, rectangular plates"
+HORSESHOES = "horseshoe vortices, written apart"
+JONES = "R. T. Jones, NACA Report 835, 1946, exact as it goes to 0"
 EXACT = "exact"
 
 SLOPES = {1.0: 1.4602, 2.0: 2.4744}  # of the lift coefficient [1/rad], published
 INCIDENCE = 0.02  # rad
 COARSE = {1.0: (8, 16), 2.0: (8, 16), 4.0: (8, 24), 8.0: (8, 32), 20.0: (6, 48)}  # rings, by aspect ratio
+SWEPT = (  # leading and trailing edge at root and tip [root chords], half the span, rings
+    ("swept and tapered wing of aspect ratio 6", (0.0, 1.6), (1.0, 2.2), 2.4, (6, 24)),
+    ("delta of aspect ratio 2", (0.0, 1.0), (1.0, 1.0), 0.5, (8, 16)),
+)
 ADDED = {1.0: 0.579, 2.0: 0.757}  # over pi/4 times density, chord² and span, by span over chord
 REST = 8  # steps before a plate is moved
 
@@ -61,6 +67,46 @@ def _steady(aspect: float, rings: tuple[int, int]) -> tuple[float, float]:
     driven = Driven(wing(aspect, rings=rings, step=aspect, rows=steps + 1))
     drag, lift, _ = driven.go(lambda t: (pose, np.zeros(3)), steps).wrench[-1, 0] / (0.5 * aspect)
     return float(lift / INCIDENCE), float(drag * np.pi * aspect / lift**2)
+
+
+def planforms(short: bool) -> Findings:
+    """A swept and tapered wing and deltas, long after the start: slope of the lift, and where it acts."""
+    start, rows = time.perf_counter(), []
+    for name, leading, trailing, half, rings in SWEPT:
+        slope, place = _swept(leading, trailing, half, rings)
+        right, there = surface.swept(np.array(leading), np.array(trailing), half)
+        case = f"{name}, {rings[0]} × {rings[1]} rings"
+        rows += [
+            Row(case, "slope of the lift [1/rad]", slope, right, 0.005, HORSESHOES),
+            Row(case, "lift behind the foremost point [root chords]", place, there, 0.005, HORSESHOES),
+        ]
+    slender, thinner = (
+        _swept((0.0, 1.0), (1.0, 1.0), 0.25 * aspect, (8, 32))[0] / (0.5 * np.pi * aspect)
+        for aspect in (0.1, 0.05)
+    )
+    case, what = (
+        "deltas of aspect ratio 0.1 and 0.05, carried to 0",
+        "slope of the lift over π/2 aspect ratio",
+    )
+    rows.append(Row(case, what, 2.0 * thinner - slender, 1.0, 0.01, JONES))
+    return Findings(rows, [], time.perf_counter() - start)
+
+
+def _swept(
+    leading: tuple[float, float], trailing: tuple[float, float], half: float, rings: tuple[int, int]
+) -> tuple[float, float]:
+    """Return slope of the lift, and x where it acts, of a wing whose edges run straight from root to tip."""
+    (root, tip), (behind, last), steps = leading, trailing, 30
+    corner = np.array(
+        [[root, 0.0], [tip, half], [last, half], [behind, 0.0], [last, -half], [tip, -half]], np.float64
+    )
+    if tip == last:
+        corner = corner[[0, 1, 3, 5]] if behind != last else corner[[0, 1, 5]]
+    driven = Driven(wing(0.0, rings=rings, step=max(1.0, half), rows=steps + 1, planform=corner))
+    pose = np.array([0.0, 0.0, -INCIDENCE])
+    _, lift, moment = driven.go(lambda t: (pose, np.zeros(3)), steps).wrench[-1, 0]
+    area = half * (behind - root + last - tip)
+    return float(2.0 * lift / (area * INCIDENCE)), float(moment / lift)
 
 
 def added(short: bool) -> Findings:
@@ -156,6 +202,7 @@ def _areas(corner: Array) -> Array:
 
 CASES: dict[str, Callable[[bool], Findings]] = {
     "steady wings": steady,
+    "planforms": planforms,
     "added mass": added,
     "impulse": impulse,
 }
