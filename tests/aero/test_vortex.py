@@ -252,18 +252,16 @@ MOVED = f'bodies.wing.shape={{type="wing",points={ON_AN_ARM}}}'
 
 
 def test_a_wing_on_an_arm_bears_the_forces_of_a_plate_that_is_there():
-    """F = F', T = T' + r × F', and Gᵀ alike, with the velocity v + ω × r."""
-    wing, plate = made(MOVED), made()
-    motion, found = ask(wing, 0.0, **TURNING)
-    axes = motion.rotation()[0]
-    arm = axes @ ARM
-    _, expected = ask(
-        plate, 0.0, **{**TURNING, "linear": motion.linear[0] + np.cross(motion.angular[0], arm)}
-    )
-    np.testing.assert_allclose(found.force, expected.force, rtol=0, atol=1e-12)
-    torque = expected.torque[0] + np.cross(arm, expected.force[0])
-    np.testing.assert_allclose(found.torque[0], torque, rtol=0, atol=1e-12)
+    """F = F', T = T' + r × F', with the velocity v + ω × r; without a turn the response goes the same way."""
+    for spin in (TURNING["angular"], (0.0, 0.0, 0.0)):
+        motion, found = ask(made(MOVED), 0.0, **{**TURNING, "angular": spin})
+        arm = motion.rotation()[0] @ ARM
+        there = {**TURNING, "angular": spin, "linear": motion.linear[0] + np.cross(spin, arm)}
+        _, expected = ask(made(), 0.0, **there)
+        np.testing.assert_allclose(found.force, expected.force, rtol=0, atol=1e-12)
+        torque = expected.torque[0] + np.cross(arm, expected.force[0])
+        np.testing.assert_allclose(found.torque[0], torque, rtol=0, atol=1e-12)
     moved = np.eye(6)
-    moved[:3, 3:] = -np.cross(np.eye(3), arm)
+    moved[:3, 3:] = -np.cross(np.eye(3), arm)  # ω × r
     response = moved.T @ expected.response @ moved
-    np.testing.assert_allclose(found.response, response, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found.response, response, rtol=0, atol=1e-11)
