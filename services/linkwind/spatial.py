@@ -34,6 +34,12 @@ def rotations(orientation: Array) -> Array:
     return np.ascontiguousarray(np.moveaxis(np.array(rows), -1, 0))
 
 
+def turned(turn: Array, vectors: Array) -> Array:
+    """Return vectors, shape (…, 3), times a matrix (3, 3), without BLAS: the same bits on every machine."""
+    product: Array = (turn * vectors[..., None, :]).sum(axis=-1)
+    return product
+
+
 class Motion:
     """Poses and twists of bodies as four arrays, which may be views into a message.
 

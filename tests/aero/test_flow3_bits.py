@@ -1,5 +1,9 @@
 """The model flow in three dimensions gives the same bits: twice, on threads, restored, evaluated again."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -105,6 +109,29 @@ def test_evaluated_again_for_another_iteration(lattice_steps):
     assert bits(made.answer(swing, 10.2 * made.h, 0.05)) != first
     assert bits(made.answer(swing, 10 * made.h)) == first
     assert on(made) == on(plain)
+
+
+KERNELS = """
+import hashlib
+from tests.aero import flows, flows3
+runs = [flows3.driven(shape=shape, step=step) for shape in (flows3.BALL, flows3.ROD) for step in STEPS]
+found = [run.go(flows3.swing, 5) for run in runs]
+found.append(flows.driven(shape='{ type = "ellipse", length = 1.0, width = 0.3 }').go(flows.swing, 5).wrench)
+print([hashlib.sha256(wrench.tobytes()).hexdigest() for wrench in found])
+""".replace("STEPS", f"({STEP}, {8 * STEP})")
+
+
+def test_the_kernels_of_blas_change_nothing():
+    """OpenBLAS takes those of another processor if it is told to; with fused sums and without they differ."""
+    found = []
+    for kernels in ("Haswell", "Prescott"):
+        environment = os.environ | {"OPENBLAS_CORETYPE": kernels}
+        command = [sys.executable, "-c", KERNELS]
+        found.append(
+            subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+        )
+    assert found[0].count(",") == 4
+    assert found[0] == found[1]
 
 
 def test_a_state_from_the_beginning():

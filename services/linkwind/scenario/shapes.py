@@ -278,7 +278,7 @@ def shape_of(data: Mapping[str, Any] | None) -> AnyShape | None:
 def signed_area(points: Array) -> float:
     """Return the area of a polygon [m²], negative where its points, shape (n, 2), run clockwise."""
     (x, y), (x1, y1) = points.T, np.roll(points, -1, axis=0).T
-    return 0.5 * float(x @ y1 - x1 @ y)
+    return 0.5 * float((x * y1 - x1 * y).sum())  # no BLAS: the same bits on every machine
 
 
 def _circle(n: int) -> Array:

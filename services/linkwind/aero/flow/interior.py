@@ -10,7 +10,7 @@ import numpy as np
 
 from linkwind.scenario.bodies import Body
 from linkwind.scenario.shapes import Ellipsoid, signed_area
-from linkwind.spatial import Array, rotations
+from linkwind.spatial import Array, rotations, turned
 
 OUTLINE = 2000  # points of an outline whose moments are taken
 
@@ -61,8 +61,8 @@ class InteriorInSpace:
         found = np.zeros((len(pose), 6, 6))
         for body, turn in enumerate(rotations(pose[:, 3:])):
             of_body = found[body]
-            x, y, z = turn @ self._first[body]
-            second = turn @ self._second[body] @ turn.T
+            x, y, z = turned(turn, self._first[body])
+            second = turned(turn, turned(turn, self._second[body]).T)
             of_body[:3, :3] = self._volume[body] * np.eye(3)
             of_body[3:, :3] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
             of_body[:3, 3:] = of_body[3:, :3].T

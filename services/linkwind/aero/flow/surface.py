@@ -26,7 +26,7 @@ from linkwind.native.boundary import Indices
 from linkwind.native.boundary3 import Markers3
 from linkwind.scenario.bodies import Body, Joint
 from linkwind.scenario.shapes import Ellipsoid, Plate
-from linkwind.spatial import Array, rotations
+from linkwind.spatial import Array, rotations, turned
 
 # Cells by which free edges of plates and closed surfaces are drawn in, see `inset`. Calibrated on a square
 # plate and on a sphere: their added masses without viscosity; with some G. G. Stokes' force on a sphere that
@@ -70,10 +70,10 @@ def _covered(pose: Array, others: list[Body], poses: Array, cell: float) -> _Cov
     """Return what tells which points of a body's frame [cells], shape (k, 3), lie on other bodies."""
 
     def covered(points: Array) -> Truths:
-        world, found = pose[:3] + cell * points @ _axes(pose).T, np.zeros(len(points), bool)
+        world, found = pose[:3] + turned(_axes(pose), cell * points), np.zeros(len(points), bool)
         for other, at in zip(others, poses, strict=True):
             assert other.shape is not None
-            found |= distance(other.shape, (world - at[:3]) @ _axes(at)) <= AT_END * cell
+            found |= distance(other.shape, turned(_axes(at).T, world - at[:3])) <= AT_END * cell
         return found
 
     return covered
