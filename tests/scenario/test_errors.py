@@ -92,6 +92,8 @@ WRONG = [
     ("order = 3", "order = 4", "coupling.order: expected a number of at most 3; got 4. Change the value."),
     ("step = 1e-3", "step = 1.5e-10",
      "coupling.step: expected a whole number of nanoseconds; got 1.5e-10. Use 1e-09."),
+    ("step = 1e-3", "step = 1e19",
+     "coupling.step: expected a number of at most 1e+09 [s]; got 1e+19. Change the value."),
     ("step = 1e-3", "step = 0.00033333333333",
      "coupling.step: expected a whole number of nanoseconds; got 0.00033333333333. Use 0.000333333."),
     ("end = 1.2 ", "end = 1.2345 ",

@@ -104,7 +104,9 @@ class Coupling(Section):
         "Difference of guess and answer at which the iterations of implicit end, relative", "1", 1e-8, gt=0.0
     )
     iterations: int = Field(default=50, ge=2, le=10000, description="Most exchanges in a step of implicit")
-    step: float = quantity("Communication step size, a whole number of nanoseconds", "s", 1e-3, gt=0.0)
+    step: float = quantity(
+        "Communication step size, a whole number of nanoseconds", "s", 1e-3, gt=0.0, le=1e9
+    )
     timeout: float = quantity(
         "Wait this long for an answer from a participant that is alive", "s", 2.0, gt=0.0
     )
