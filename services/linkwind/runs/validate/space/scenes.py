@@ -24,8 +24,8 @@ CALIBRATED = "; markers are calibrated on it"  # where a row is no independent e
 Course = Callable[[float], tuple[Array, Array]]
 """Position [m] and rotation vector [rad], and twist [m/s, rad/s], at a time [s], each (6,)."""
 
-Watch = Callable[[Flow, int], None]
-"""Sees the flow before each of its steps, with the step's number; the wrench of this step is known."""
+Watch = Callable[[Flow, Wrench, int], None]
+"""Sees the flow before each of its steps, with the wrench of this step, its diagnostics, and its number."""
 
 
 def plate(chord: float, span: float) -> str:
@@ -100,13 +100,14 @@ def driven(text: str, course: Course, steps: int, watch: Watch | None = None) ->
     assert isinstance(model, Flow)
     h = case.coupling.step_ns / 1e9
     wrench, found = Wrench.zeros(1), np.empty((steps, 6))
+    wrench.diagnostics = np.zeros(len(model.capabilities.diagnostics))
     model.commit(0.0, _motion(*course(0.0)))
     for k in range(steps):
         there = _motion(*course((k + 1) * h))
         model.evaluate((k + 1) * h, there, wrench)
         found[k] = np.concatenate([wrench.force[0], wrench.torque[0]])
         if watch:
-            watch(model, k)
+            watch(model, wrench, k)
         model.commit((k + 1) * h, there)
     return np.asarray((np.arange(steps) + 0.5) * h, np.float64), found
 
