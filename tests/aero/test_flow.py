@@ -136,3 +136,16 @@ def test_a_closed_body_lighter_than_the_fluid_inside_is_refused():
     with pytest.raises(SimulationError, match=expected):
         light.go(swing, steps=2)
     heavy.go(swing, steps=2)
+
+
+def test_a_closed_body_of_less_inertia_than_the_fluid_inside_is_refused():
+    """Below some 0.6 of the inertia of what it displaces, with 32 cells, a free circle is turned about."""
+    displaced, step = np.pi / 4.0, round(0.25 * STEP, 9)
+    settings = {"shape": CIRCLE, "cells": 32, "step": step}
+    light, heavy = (
+        driven(f"bodies.0.mass={displaced!r}", f"bodies.0.inertia={share * displaced / 8.0!r}", **settings)
+        for share in (0.4, 1.0)
+    )
+    with pytest.raises(SimulationError, match=r"body.*inertia: expected at least 0\.\d+ kg·m² about each"):
+        light.go(swing, steps=2)
+    heavy.go(swing, steps=2)

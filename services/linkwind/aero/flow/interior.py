@@ -70,6 +70,25 @@ class InteriorInSpace:
         return found
 
 
+def weakest_axis(body: Body, pose: Array, needed: Array) -> tuple[float, float]:
+    """Return a body's inertia and the needed one [kg·m²] about the axis where the body's exceeds it least.
+
+    Args:
+        body: whose inertia is a number about z, if it is planar, or that in space.
+        pose: as in ``inertia()``; its orientation counts for a body in space.
+        needed: in W, shape (1, 1) in the plane, (3, 3) in space.
+    """
+    if isinstance(body.inertia, float):
+        return body.inertia, float(needed[-1, -1])
+    xx, yy, zz, xy, xz, yz = body.inertia
+    if needed.shape == (1, 1):
+        return zz, float(needed[0, 0])
+    turn = rotations(pose[None, 3:])[0]
+    own = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
+    axis = np.linalg.eigh(own - needed)[1][:, 0]
+    return float(axis @ own @ axis), float(axis @ needed @ axis)
+
+
 def _moments_in_space(body: Body) -> tuple[float, Array, Array]:
     """Return volume, its first moments (3,) and its second moments (3, 3) about the centre of mass."""
     shape, second = body.shape, np.zeros((3, 3))

@@ -18,6 +18,7 @@ import numpy as np
 from linkwind.aero.base import Capabilities, body_indices
 from linkwind.aero.flow import grid as grids
 from linkwind.aero.flow.geometry import geometry
+from linkwind.aero.flow.interior import weakest_axis
 from linkwind.aero.flow.motion import State
 from linkwind.aero.flow.refusals import Refusals
 from linkwind.aero.flow.start import SmoothStart
@@ -221,20 +222,24 @@ class Flow:
         return force, response
 
     def _carries_the_inside(self, inertia: Array, response: Array) -> None:
-        """Refuse a free body so light that the fluid inside it, which is to be given back, moves it.
+        """Refuse a free body so light that the fluid inside it, which is to be given back, moves or turns it.
 
-        Measured on circles of 24 to 48 cells: stable where the mass is that of the fluid inside, less half of
-        what moves with the markers in a step.
+        Measured on circles and ellipses of 24 to 48 cells and spheres of 20 to 32: stable where mass and
+        inertia are those of the fluid inside, less half of what moves with the markers in a step.
         """
         d, linear = len(self._twist), self._grid.dimensions
         jointed = {name for joint in self._scenario.joints for name in (joint.parent, joint.child)}
         for i, body in enumerate(self._acted):
             if body.shape is None or not body.shape.closed or body.name in jointed:
                 continue
-            least = float(np.linalg.eigvalsh(response[d * i : d * i + linear, d * i : d * i + linear])[0])
-            needed = 0.5 * (float(inertia[i, 0, 0]) - self._h * least)
-            if body.mass < needed:
-                raise self._refuse.lighter_than_inside(body, needed)
+            own = slice(d * i, d * (i + 1))
+            needed = 0.5 * (inertia[i] - self._h * response[own, own])
+            mass = float(np.linalg.eigvalsh(needed[:linear, :linear])[-1])
+            if body.mass < mass:
+                raise self._refuse.lighter_than_inside(body, mass)
+            turning, least = weakest_axis(body, self._trial.pose[i], needed[linear:, linear:])
+            if turning < least:
+                raise self._refuse.turned_by_inside(body, turning, least)
 
     def _several_steps(self, t: float) -> Array:
         """Step the fluid to the trial state; return the mean force, shape (n, d)."""

@@ -61,6 +61,15 @@ class Refusals:
             "cells, or plates, which may be without mass."
         )
 
+    def turned_by_inside(self, body: Body, inertia: float, least: float) -> SimulationError:
+        """A free closed body has less inertia about some axis than this, both in kg·m²."""
+        index = [other.name for other in self._scenario.bodies].index(body.name)
+        return SimulationError(
+            f"{self._scenario.where('bodies', index)}.inertia: expected at least {least:.3g} kg·m² about "
+            "each axis, for the fluid inside a closed shape turns a free one that has less; got "
+            f"{inertia:.3g} about one. Make it larger, as that of a solid body, or use fewer cells."
+        )
+
     def unstable(self, t: float, force: Array) -> SimulationError:
         """A force is not finite."""
         return SimulationError(
