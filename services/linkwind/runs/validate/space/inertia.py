@@ -85,7 +85,8 @@ model = "field"
 let = {{ s = "min(t / {0.2 * steps * step!r}, 1)" }}
 {along} = "{size * moved!r} * s * s * (3 - 2 * s)"
 """
-    body = f"mass = {mass!r}\ninertia = [0.02, 0.02, 0.02, 0.0, 0.0, 0.0]"
+    inertia = max(0.1 * mass, 0.02)  # that of a sphere; of a plate no matter
+    body = f"mass = {mass!r}\ninertia = [{', '.join([repr(inertia)] * 3)}, 0.0, 0.0, 0.0]"
     text = scene(
         shape, cells, step, 1e-6 * cell**2 / step, (4.0, 4.0, 4.0), end=steps * step, body=body, rest=push
     )  # fmt: skip
