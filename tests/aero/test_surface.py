@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from linkwind.aero.flow.nearness import distance
+from linkwind.aero.flow.nearness import distance, from_line, inside
 from linkwind.aero.flow.outline import SPACING, inset
 from linkwind.aero.flow.rings import CLOSEST
 from linkwind.aero.flow.surface import CLOSED_INSET, EDGE_INSET, surface_markers
@@ -99,6 +99,103 @@ def test_only_that_part_of_an_edge_is_not_free_which_lies_on_the_other_body():
     np.testing.assert_allclose([fin_at[:, 2].min(), fin_at[:, 2].max()], [FREE - 10, 10 - SPACING / 2])
 
 
+def wing(points, name="body"):
+    """A wing whose corners are in cells."""
+    return body({"type": "wing", "points": (CELL * np.array(points, float)).tolist()}, name)
+
+
+TURN = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+DISC = 10 * np.column_stack([np.cos(TURN), np.sin(TURN)])
+DELTA = [[-8, -8], [-8, 8], [8, 0]]  # from z towards x: the other way around
+SWEPT = [[0, 0], [3, 14], [-3, 14], [-9, 0], [-3, -14], [3, -14]]
+NECK = [[-1, 0], [1, 0], [1, 6], [5, 9], [5, 20], [-5, 20], [-5, 9], [-1, 6]]
+WAIST = [[-5, 0], [5, 0], [0.8, 7], [0.8, 12], [5, 18], [-5, 18], [-0.8, 12], [-0.8, 7]]
+
+
+def markers_of(points, viscosity=VISCOSITY):
+    return surface_markers([wing(points)], [], AT_REST[None], CELL, viscosity)
+
+
+def test_a_rectangular_wing_has_the_markers_of_a_plate():
+    made = markers_of([[-12, -30], [12, -30], [12, 30], [-12, 30]]).point
+    wanted = surface_markers([plate(24, 60)], [], AT_REST[None], CELL, VISCOSITY).point
+    assert len(made) == len(wanted)
+    off = np.linalg.norm(made[:, None] - wanted, axis=2).min(axis=1)
+    assert off.max() < 1e-6
+
+
+@pytest.mark.parametrize("points", [DISC, DELTA, SWEPT, NECK, WAIST])
+@pytest.mark.parametrize("viscosity", [0.1, VISCOSITY, 1e-5])
+def test_markers_of_a_wing_are_spread_evenly_and_drawn_in(points, viscosity):
+    found = markers_of(points, viscosity)
+    spread, flat = nearest(found.point), found.point[:, ::2]
+    assert not found.point[:, 1].any()
+    assert spread.min() >= CLOSEST
+    assert spread.max() < 1.35 * SPACING
+    corners = np.array(points, float)
+    assert inside(corners, flat).all()
+    drawn = inset(EDGE_INSET, viscosity)
+    if points is not NECK and points is not WAIST:  # whose narrow parts have a row all the same
+        assert from_line(corners, flat).min() > min(drawn, 1.4) - 0.02
+    rng = np.random.default_rng(2)
+    tried = rng.uniform(corners.min(axis=0), corners.max(axis=0), size=(4000, 2))
+    tried = tried[inside(corners, tried)]
+    tried = tried[from_line(corners, tried) > drawn + SPACING]
+    holes = np.linalg.norm(flat[:, None] - tried, axis=2).min(axis=0)
+    assert holes.max(initial=0.0) < 1.15
+
+
+def test_a_disc_has_as_many_markers_as_its_area_asks_for():
+    points = markers_of(DISC).point
+    rim = np.hypot(*points[:, ::2].T).max()
+    assert rim == pytest.approx(10 - FREE, abs=0.05)
+    within = np.pi * rim**2 / SPACING**2 + np.pi * rim / SPACING  # half of the rim's lie outside their share
+    assert len(points) == pytest.approx(within, rel=0.05)
+
+
+def test_patches_of_a_wing_lie_flat_on_it_and_do_not_cover_more():
+    found = markers_of(DISC)
+    a, b, c, d = np.moveaxis(found.point[found.face][:, :, ::2], 1, 0)
+    area = 0.5 * np.abs(_cross(c - a, d - b))
+    sides = [np.linalg.norm(p - q, axis=1) for p, q in ((a, b), (b, c), (a, c))]
+    assert max(side.max() for side in sides) < 2.5
+    assert area.min() > 0.2
+    assert 0.7 < area.sum() / (np.pi * (10 - FREE) ** 2) < 1.0
+
+
+def _cross(u, v):
+    return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+
+
+def test_a_narrow_part_between_wide_ones_keeps_a_row_in_its_middle():
+    flat = markers_of(WAIST).point[:, ::2]
+    neck = flat[(flat[:, 1] > 7) & (flat[:, 1] < 12)]
+    assert np.abs(neck[:, 0]).max() < 0.3
+    assert len(neck) == pytest.approx(5 / SPACING, abs=1)
+
+
+@pytest.mark.parametrize("width", [0.4, 1.8])
+def test_a_wing_that_is_narrow_everywhere_keeps_one_row_or_two(width):
+    half = width / 2
+    flat = markers_of([[-half, 0], [half, 0], [half, 16], [-half, 16]]).point[:, ::2]
+    rows = 1 if width < CLOSEST else 2
+    assert len(flat) == pytest.approx(rows * (1 + 16 / SPACING), abs=rows)
+    assert np.ptp(flat[:, 1]) > 14
+
+
+def test_the_edge_of_a_wing_on_another_body_is_drawn_in_by_half_the_distance_of_markers():
+    one = wing([[-8, 0], [8, 0], [4, 20], [-8, 20]], "one")
+    two = plate(16, 12, "two")
+    joint = hinged(one, two, (0.0, 0.0, 0.0), (0.0, 0.0, 6 * CELL))
+    below = np.array([0.0, 0.0, -6 * CELL, 1.0, 0.0, 0.0, 0.0])
+    markers = surface_markers([one, two], [joint], np.array([AT_REST, below]), CELL, VISCOSITY)
+    first, second = (markers.point[markers.body == k] for k in (0, 1))
+    np.testing.assert_allclose([first[:, 2].min(), first[:, 2].max()], [SPACING / 2, 20 - FREE], atol=0.02)
+    assert second[:, 2].max() == pytest.approx(6 - SPACING / 2)
+    free = surface_markers([one, two], [], np.array([AT_REST, below]), CELL, VISCOSITY)
+    assert free.point[free.body == 0][:, 2].min() == pytest.approx(FREE, abs=0.02)
+
+
 @pytest.mark.parametrize(
     "shape",
     [
@@ -174,3 +271,6 @@ def test_distances_from_shapes():
     np.testing.assert_allclose(distance(box, points), CELL * np.array([0, 0.5, 5, 5]))
     ball = body({"type": "ellipsoid", "size": cells((4, 4, 4))}).shape
     np.testing.assert_allclose(distance(ball, CELL * np.array([[0, 3, 4], [1, 1, 1]])), [3 * CELL, 0])
+    delta = wing(DELTA).shape
+    points = CELL * np.array([[0, 3, 0], [-7.9, 0, 7.9], [-11, 4, 0], [-8, 0, 12], [11, 0, 0]])
+    np.testing.assert_allclose(distance(delta, points), CELL * np.array([3, 0, 5, 4, 3]))

@@ -12,7 +12,7 @@ from linkwind.errors import ScenarioError
 from linkwind.native.lattice import shear_rate
 from linkwind.scenario import Provider, Scenario
 from linkwind.scenario.bodies import Body
-from linkwind.scenario.shapes import AnyShape, Circle, Ellipse, Ellipsoid, Rectangle, signed_area
+from linkwind.scenario.shapes import AnyShape, Circle, Ellipse, Ellipsoid, Rectangle, Wing, signed_area
 from linkwind.spatial import Array
 
 MAX_SPEED = 0.12  # cells a step that body or wind may go: a Mach number of 0.21
@@ -132,8 +132,10 @@ def _size(body: Body, dimensions: int) -> float:
 
 
 def reach(body: Body, dimensions: int) -> float:
-    """Return how far a body reaches from its middle [m]."""
+    """Return how far a body reaches from its centre of mass [m]."""
     assert body.shape is not None
+    if isinstance(body.shape, Wing):
+        return float(np.linalg.norm(body.shape.planform, axis=1).max())
     across = body.shape.span if dimensions == 3 else 0.0
     return 0.5 * math.hypot(body.shape.reference_length, across)
 
@@ -143,9 +145,11 @@ def moved(body: Body, grid: Grid) -> float:
 
     That of a plate across its motion, and of a circle.
     """
-    assert body.shape is not None
-    sides = (body.shape.reference_length, body.shape.span)
-    volume = sides[0] ** 2 if grid.dimensions == 2 else min(sides) ** 2 * max(sides)
+    shape = body.shape
+    assert shape is not None
+    sides = (shape.reference_length, shape.span)
+    area = signed_area(shape.planform) if isinstance(shape, Wing) else sides[0] * sides[1]
+    volume = sides[0] ** 2 if grid.dimensions == 2 else min(sides) * area
     return 0.25 * math.pi * grid.density * volume
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwind.scenario.shapes import AnyShape, Ellipsoid, Plate
+from linkwind.scenario.shapes import AnyShape, Ellipsoid, Plate, Wing
 from linkwind.spatial import Array
 
 Truths = NDArray[np.bool_]
@@ -22,9 +22,12 @@ def distance(shape: AnyShape, points: Array) -> Array:
     if isinstance(shape, Ellipsoid):
         scale = np.maximum(_norm(points / (0.5 * np.array(shape.size))), 1.0)
         return _norm(points) * (1.0 - 1.0 / scale)
-    outline, flat = shape.outline(), points[:, :2]
+    if isinstance(shape, Wing):
+        outline, flat, beyond = shape.planform, points[:, ::2], np.abs(points[:, 1])
+    else:
+        outline, flat = shape.outline(), points[:, :2]
+        beyond = np.maximum(np.abs(points[:, 2]) - 0.5 * shape.span, 0.0)
     beside = np.where(inside(outline, flat), 0.0, from_line(outline, flat))
-    beyond = np.maximum(np.abs(points[:, 2]) - 0.5 * shape.span, 0.0)
     return _norm(np.column_stack([beside, beyond]))
 
 

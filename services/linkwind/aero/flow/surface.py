@@ -1,13 +1,12 @@
 """The markers that stand for the bodies in the fluid in space: where they lie on the surfaces.
 
 As in the plane (``outline``) a marker makes a surface act as if it were thicker, so surfaces and the free
-edges of plates are drawn in. What of an edge lies on another body, with which a joint connects, is not free:
-it is drawn in by half the distance of two markers, so that no gap is left in which the fluid leaks.
+edges of plates and wings are drawn in. What of an edge lies on another body, with which a joint connects, is
+not free: it is drawn in by half the distance of two markers, so that no gap is left in which the fluid leaks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -21,11 +20,12 @@ from linkwind.aero.flow.outline import (
     inset,
     joined,
 )
+from linkwind.aero.flow.planform import Covered, wing
 from linkwind.aero.flow.rings import ellipsoid
 from linkwind.native.boundary import Indices
 from linkwind.native.boundary3 import Markers3
 from linkwind.scenario.bodies import Body, Joint
-from linkwind.scenario.shapes import Ellipsoid, Plate
+from linkwind.scenario.shapes import Ellipsoid, Plate, Wing
 from linkwind.spatial import Array, rotations, turned
 
 # Cells by which free edges of plates and closed surfaces are drawn in, see `inset`. Calibrated on a square
@@ -37,7 +37,6 @@ CLOSED_INSET = (0.49, 0.145, 0.25, 1.22)
 FROM_RIM = 0.85 * SPACING  # cells, at least, from the rim of a flat end to the grid in it
 
 _Surface = tuple[Array, Indices]  # markers in the body frame [cells], (k, 3), and the patches, (m, 4)
-_Covered = Callable[[Array], Truths]
 
 
 def surface_markers(
@@ -66,7 +65,7 @@ def surface_markers(
     return Markers3(body_of, np.concatenate(points), np.concatenate(faces).astype(np.int32), may_touch)
 
 
-def _covered(pose: Array, others: list[Body], poses: Array, cell: float) -> _Covered:
+def _covered(pose: Array, others: list[Body], poses: Array, cell: float) -> Covered:
     """Return what tells which points of a body's frame [cells], shape (k, 3), lie on other bodies."""
 
     def covered(points: Array) -> Truths:
@@ -84,12 +83,14 @@ def _axes(pose: Array) -> Array:
     return axes
 
 
-def _surface(body: Body, cell: float, viscosity: float, covered: _Covered) -> _Surface:
+def _surface(body: Body, cell: float, viscosity: float, covered: Covered) -> _Surface:
     shape, closed = body.shape, inset(CLOSED_INSET, viscosity)
     assert shape is not None  # the scenario has been checked
     if isinstance(shape, Plate):
         half = 0.5 * np.array([shape.length, shape.span]) / cell
         return _plate(half, inset(EDGE_INSET, viscosity), covered)
+    if isinstance(shape, Wing):
+        return wing(shape.planform / cell, inset(EDGE_INSET, viscosity), covered)
     if isinstance(shape, Ellipsoid):
         return ellipsoid(0.5 * np.array(shape.size) / cell, closed)
     return _cylinder(around(shape, cell, viscosity), 0.5 * shape.span / cell, closed)
@@ -98,7 +99,7 @@ def _surface(body: Body, cell: float, viscosity: float, covered: _Covered) -> _S
 # ---- plates ----
 
 
-def _plate(half: Array, free: float, covered: _Covered) -> _Surface:
+def _plate(half: Array, free: float, covered: Covered) -> _Surface:
     """Return a grid along x and z, each line of which ends where the edge is drawn in to.
 
     Args:
