@@ -6,7 +6,8 @@ from foxglove.messages import Color, SceneEntity
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
 from linkwind.log import solids
-from linkwind.log.solids import solid, triangles
+from linkwind.log.solids import solid
+from linkwind.scenario.ears import triangles
 from linkwind.scenario.pictures import pictures_of
 from linkwind.scenario.shapes import shape_of, signed_area
 

@@ -20,8 +20,9 @@ from foxglove.messages import (
 )
 
 from linkwind.scenario import pictures as drawings
+from linkwind.scenario.ears import triangles
 from linkwind.scenario.pictures import Box, Capsule, Mesh, Pictures
-from linkwind.scenario.shapes import AnyShape, Circle, Ellipse, Ellipsoid, Plate, Rectangle
+from linkwind.scenario.shapes import AnyShape, Circle, Ellipse, Ellipsoid, Plate, Rectangle, Wing
 from linkwind.spatial import Array
 
 ORIGIN = Pose(position=Vector3(x=0.0, y=0.0, z=0.0), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0))
@@ -46,6 +47,8 @@ def solid(shape: AnyShape, thickness: float, color: Color) -> dict[str, Any]:
         return {"cylinders": [cylinder]}
     if isinstance(shape, Ellipsoid):
         return {"spheres": [SpherePrimitive(pose=ORIGIN, size=_size(*shape.size), color=color)]}
+    if isinstance(shape, Wing):
+        return {"triangles": [_sheet(shape.planform, color)]}
     return {"triangles": [_prism(shape.outline(), shape.span, color)]}
 
 
@@ -91,6 +94,13 @@ def _cube(x: float, y: float, z: float, color: Color) -> CubePrimitive:
     return CubePrimitive(pose=ORIGIN, size=Vector3(x=x, y=y, z=z), color=color)
 
 
+def _sheet(planform: Array, color: Color) -> TriangleListPrimitive:
+    """Return a flat wing, seen from both sides."""
+    points = [Point3(x=x, y=0.0, z=z) for x, z in planform.tolist()]
+    indices = [i for a, b, c in triangles(planform) for i in (a, c, b, a, b, c)]
+    return TriangleListPrimitive(pose=ORIGIN, points=points, indices=indices, color=color)
+
+
 def _prism(outline: Array, span: float, color: Color) -> TriangleListPrimitive:
     """Return the two faces and the sides between them; the points of the far face follow the near one's."""
     n = len(outline)
@@ -102,32 +112,3 @@ def _prism(outline: Array, span: float, color: Color) -> TriangleListPrimitive:
         j = (i + 1) % n
         indices += [i, j, n + j, i, n + j, n + i]
     return TriangleListPrimitive(pose=ORIGIN, points=points, indices=indices, color=color)
-
-
-def triangles(outline: Array) -> list[tuple[int, int, int]]:
-    """Return the triangles that fill a polygon, as indices of its points, by cutting off its ears.
-
-    Args:
-        outline: of a polygon whose sides do not cross, counter-clockwise, shape (n, 2).
-    """
-    left, found = list(range(len(outline))), []
-    while len(left) > 3:
-        corners = [(left[i - 1], left[i], left[(i + 1) % len(left)]) for i in range(len(left))]
-        ear = next((ear for ear in corners if _is_ear(outline, ear, left)), corners[0])
-        found.append(ear)
-        left.remove(ear[1])
-    return [*found, (left[0], left[1], left[2])]
-
-
-def _is_ear(outline: Array, corner: tuple[int, int, int], left: list[int]) -> bool:
-    """Return whether the corner sticks out and holds no other point."""
-    a, b, c = (outline[i] for i in corner)
-    if _side(a, b, c) <= 0.0:
-        return False
-    others = (outline[i] for i in left if i not in corner)
-    return not any(min(_side(a, b, p), _side(b, c, p), _side(c, a, p)) >= 0.0 for p in others)
-
-
-def _side(a: Array, b: Array, p: Array) -> float:
-    """Return twice the area of the triangle a b p, above 0 where p is to the left of the way from a to b."""
-    return float((b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]))

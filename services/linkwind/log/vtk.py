@@ -2,8 +2,8 @@
 
 Frames of a fluid become images (``flow_PROVIDER_0001.vti`` in a plane, ``volume_PROVIDER_0001.vti`` in a box,
 values in cells), wings and their wakes the rings on them (``wake_PROVIDER_0001.vtu``, circulation in cells),
-bodies their outlines in their x, y planes, with the forces on them (``bodies_0001.vtu``); ``*.pvd`` hold them
-together over time.
+bodies their outlines in their x, y planes, in space their surfaces and centres of mass, with the forces on
+them (``bodies_0001.vtu``); ``*.pvd`` hold them together over time.
 Bodies are written at the times of the frames, or, without any, at times spread evenly over the run.
 """
 
@@ -21,21 +21,35 @@ from linkwind.frames import FlowFrame, VolumeFrame, WakeFrame
 from linkwind.log import contents, tables
 from linkwind.log.reader import Log
 from linkwind.log.scenarios import recorded
+from linkwind.log.surfaces import Surface, surface
 from linkwind.log.vortices import criterion, gradient, vorticity
+from linkwind.scenario.shapes import AnyShape
 from linkwind.spatial import Array, rotations
 
 STATES = 300  # of the bodies, where there are no frames
-VERTEX, POLYLINE, POLYGON, QUAD = 1, 4, 7, 9  # types of VTK's cells
+VERTEX, POLYLINE, TRIANGLE, POLYGON, QUAD = 1, 4, 5, 7, 9  # types of VTK's cells
+AROUND = {3: TRIANGLE, 4: QUAD}  # by the number of their points; others are polygons
 BLOCK = 1024  # states in memory at a time
 
 
-class Outlines(NamedTuple):
-    """Outlines of bodies in their frames, a cell each: points [m], whose they are; ends, types of cells."""
+class Cells(NamedTuple):
+    """Bodies as cells, in their frames.
+
+    Attributes:
+        points: corners of all [m], shape (k, 3).
+        whose: body of each point, shape (k,).
+        corners: numbers of the points around the cells, one cell after the other.
+        ends: of the cells among them, shape (m,).
+        types: VTK's, shape (m,).
+        body: of each cell, shape (m,).
+    """
 
     points: Array
-    body: Any
+    whose: Any
+    corners: Any
     ends: Any
     types: Any
+    body: Any
 
 
 def export_vtk(log: Log, folder: Path) -> list[Path]:
@@ -68,9 +82,9 @@ def export_vtk(log: Log, folder: Path) -> list[Path]:
                 times.append(frame.time_ns)
             written.append(_saved(found, folder / name))
         if log.topics.get(contents.STATE):
-            found = group(str(folder / "bodies"))
+            found, cells = group(str(folder / "bodies")), _cells(log)
             for number, (time_ns, state) in enumerate(_states(log, times), 1):
-                found.addFile(_bodies(hl, folder / f"bodies_{number:04}", log, state), time_ns / 1e9)
+                found.addFile(_bodies(hl, folder / f"bodies_{number:04}", cells, state), time_ns / 1e9)
             written.append(_saved(found, folder / "bodies"))
     except OSError as error:
         raise LogError(
@@ -179,37 +193,62 @@ def _states(log: Log, times: Sequence[int]) -> Iterator[tuple[int, dict[str, Any
                 yield message.time_ns, {name: values[row] for name, values in columns.items()}
 
 
-def _bodies(hl: Any, path: Path, log: Log, state: dict[str, Any]) -> str:
-    outlines = _outlines(log)
-    turn = rotations(state["motion.orientation"].reshape(-1, 4))[outlines.body]
+def _bodies(hl: Any, path: Path, cells: Cells, state: dict[str, Any]) -> str:
+    turn = rotations(state["motion.orientation"].reshape(-1, 4))[cells.whose]
     position = state["motion.position"].reshape(-1, 3)
-    points = np.einsum("pij,pj->pi", turn, outlines.points) + position[outlines.body]
+    points = np.einsum("pij,pj->pi", turn, cells.points) + position[cells.whose]
     wrench = state["wrench"].reshape(-1, 6)
 
     def vector(values: Array) -> tuple[Array, ...]:
         return tuple(np.ascontiguousarray(column) for column in values.T)
 
     data = {
-        "body": np.arange(len(position)),
-        "force [N]": vector(wrench[:, :3]),
-        "torque [N m]": vector(wrench[:, 3:]),
-        "velocity [m/s]": vector(state["motion.linear"].reshape(-1, 3)),
-        "angular velocity [rad/s]": vector(state["motion.angular"].reshape(-1, 3)),
+        "body": cells.body,
+        "centre": (cells.types == VERTEX).astype(np.uint8),
+        "force [N]": vector(wrench[cells.body, :3]),
+        "torque [N m]": vector(wrench[cells.body, 3:]),
+        "velocity [m/s]": vector(state["motion.linear"].reshape(-1, 3)[cells.body]),
+        "angular velocity [rad/s]": vector(state["motion.angular"].reshape(-1, 3)[cells.body]),
     }
     x, y, z = vector(points)
-    where = np.arange(len(points))
     return str(
-        hl.unstructuredGridToVTK(str(path), x, y, z, where, outlines.ends, outlines.types, cellData=data)
+        hl.unstructuredGridToVTK(str(path), x, y, z, cells.corners, cells.ends, cells.types, cellData=data)
     )
 
 
-def _outlines(log: Log) -> Outlines:
-    """Return the outlines of a log's bodies; a body without a shape is a point."""
-    points, body, types = [], [], []
-    for index, each in enumerate(recorded(log).bodies):
-        flat = np.zeros((1, 2)) if each.shape is None else each.shape.outline()
-        points.append(np.hstack([flat, np.zeros((len(flat), 1))]))
-        body += [index] * len(flat)
-        types.append(VERTEX if each.shape is None else POLYGON if each.shape.closed else POLYLINE)
-    ends = np.cumsum([len(each) for each in points])
-    return Outlines(np.vstack(points), np.array(body), ends, np.array(types, np.uint8))
+def _cells(log: Log) -> Cells:
+    """Return the bodies of a log: in a plane an outline each, or a point; in space surfaces and points."""
+    scenario = recorded(log)
+    flat = scenario.planar and not log.volumes and not log.wakes
+    points: list[Array] = []
+    corners: list[Any] = []
+    whose: list[int] = []  # body of a point
+    types: list[int] = []
+    body: list[int] = []
+    for index, each in enumerate(scenario.bodies):
+        for found, kind in _parts(each.shape, flat=flat):
+            corners += [len(whose) + np.array(cell) for cell in found.cells]
+            points.append(found.point)
+            whose += [index] * len(found.point)
+            types += [kind or AROUND.get(len(cell), POLYGON) for cell in found.cells]
+            body += [index] * len(found.cells)
+    ends = np.cumsum([len(each) for each in corners])
+    return Cells(
+        np.vstack(points),
+        np.array(whose),
+        np.concatenate(corners),
+        ends,
+        np.array(types, np.uint8),
+        np.array(body),
+    )
+
+
+def _parts(shape: AnyShape | None, *, flat: bool) -> list[tuple[Surface, int | None]]:
+    """Return what shows a body: cells, and of which type if that does not follow from their points."""
+    centre = (Surface(np.zeros((1, 3)), [[0]]), VERTEX)
+    if shape is None:
+        return [centre]
+    if not flat:
+        return [centre, (surface(shape), None)]
+    outline = np.insert(shape.outline(), 2, 0.0, axis=1)
+    return [(Surface(outline, [list(range(len(outline)))]), POLYGON if shape.closed else POLYLINE)]

@@ -6,7 +6,8 @@ import numpy as np
 
 from linkwind.mechanism.quaternion import matrix
 from linkwind.report.data import Run
-from linkwind.scenario.shapes import AnyShape, Ellipsoid, shape_of
+from linkwind.scenario.ears import triangles
+from linkwind.scenario.shapes import AnyShape, Ellipsoid, Wing, shape_of
 from linkwind.spatial import Array
 
 ROUND = 48  # points around an ellipsoid
@@ -21,7 +22,8 @@ def body_faces(run: Run, state: int) -> list[Array]:
         state: index of the time.
 
     Returns:
-        corners [m], counterclockwise as seen from outside, a plate as one sheet, each shape (m, 3, 3), in W.
+        corners [m], counterclockwise as seen from outside, a plate or a wing as one sheet, each shape
+        (m, 3, 3), in W.
     """
     path, found = run.trajectory, []
     for body, each in enumerate(run.scenario["bodies"]):
@@ -36,16 +38,17 @@ def faces(shape: AnyShape) -> Array:
     """Return triangles over a shape's surface in the body frame [m], like :func:`body_faces`."""
     if isinstance(shape, Ellipsoid):
         return 0.5 * np.array(shape.size) * _ball(ROUND)
+    most = max(shape.reference_length, shape.span) / PIECES
+    if isinstance(shape, Wing):
+        planform = np.insert(shape.planform, 1, 0.0, axis=1)
+        return _divided(planform[np.array(triangles(shape.planform))], most)
     outline, half = shape.outline(), np.array([0.0, 0.0, 0.5 * shape.span])
     flat = np.pad(outline, ((0, 0), (0, 1)))
     ahead = np.roll(flat, -1, axis=0) if shape.closed else flat[1:]
     behind = flat if shape.closed else flat[:-1]
     sides = _quads(behind - half, ahead - half, ahead + half, behind + half)
-    most = max(shape.reference_length, shape.span) / PIECES
     if not shape.closed:
         return _divided(sides, most)
-    from linkwind.log.solids import triangles
-
     cap = flat[np.array(triangles(outline))]
     return _divided(np.concatenate([sides, cap + half, cap[:, ::-1] - half]), most)
 

@@ -11,11 +11,13 @@ from linkwind.report.arrays import every_nth, pack
 from linkwind.report.data import Run
 from linkwind.report.wires import Line, wires
 from linkwind.scenario import pictures as drawings
+from linkwind.scenario.ears import triangles
 from linkwind.scenario.pictures import pictures_of
-from linkwind.scenario.shapes import Ellipsoid, shape_of
+from linkwind.scenario.shapes import Ellipsoid, Polygon, Wing, shape_of
 from linkwind.spatial import Array
 
 FRAMES = 1500
+SHEETS = ("plate", "wing")  # shapes without thickness
 
 
 def scene(run: Run) -> dict[str, Any] | None:
@@ -71,9 +73,18 @@ def _body(run: Run, index: int) -> dict[str, Any]:
         "name": body["name"],
         "mass": max(body["mass"], 1e-12),  # weights of a mean, which must not all be 0
         "lines": _as_data(lines),
-        "thick": not body.get("picture") and (body.get("shape") or {"type": "plate"})["type"] == "plate",
+        "ends": _ends(body),
+        "thick": not body.get("picture") and (body.get("shape") or {"type": "plate"})["type"] in SHEETS,
         "reach": float(np.linalg.norm(points[:, : 2 if flat(run) else 3], axis=1).max()),
     }
+
+
+def _ends(body: Mapping[str, Any]) -> list[tuple[int, int, int]] | None:
+    """Return the triangles that fill each closed line of a body; None where one to their middle does."""
+    shape = None if body.get("picture") else shape_of(body.get("shape"))
+    if isinstance(shape, Wing):
+        return triangles(shape.planform)
+    return triangles(shape.outline()) if isinstance(shape, Polygon) else None
 
 
 def _as_data(lines: list[Line]) -> list[dict[str, Any]]:
@@ -105,7 +116,8 @@ def _joint_points(run: Run, name: str) -> Array:
 def _lines(body: Mapping[str, Any], joint_points: Array, planar: bool) -> list[Line]:
     """Return what is drawn of a body: lines in its frame [m], shape (m, 3), each with whether it is closed.
 
-    A plate is its rectangle; another shape its outline, in 3-D both faces and four edges between them.
+    A plate is its rectangle, a wing its planform; another shape its outline, in 3-D both faces and four
+    edges between them.
     """
     drawn = [line for picture in pictures_of(body) for line in wires(picture)]
     if drawn:
@@ -115,6 +127,8 @@ def _lines(body: Mapping[str, Any], joint_points: Array, planar: bool) -> list[L
         return [_without_shape(body, joint_points)]
     if isinstance(shape, Ellipsoid):
         return wires(drawings.Ellipsoid(type="ellipsoid", size=shape.size))
+    if isinstance(shape, Wing):
+        return [(np.insert(shape.planform, 1, 0.0, axis=1), True)]
     outline, half = shape.outline(), 0.5 * shape.span
     near, far = (np.pad(outline, ((0, 0), (0, 1)), constant_values=z) for z in (-half, half))
     if not shape.closed:

@@ -15,6 +15,10 @@ function facesOf(body) {
   const loops = body.lines.filter(({ closed, points }) => closed && points.length > 2).map(({ points: line }) => {
     const start = points.length;
     points.push(...line);
+    if (body.ends) {
+      triangles.push(...body.ends.map((corners) => corners.map((i) => start + i)));
+      return { start, n: line.length };
+    }
     const middle = points.push([0, 1, 2].map((k) => line.reduce((sum, p) => sum + p[k], 0) / line.length)) - 1;
     line.forEach((_, i) => triangles.push([start + i, start + (i + 1) % line.length, middle]));
     return { start, n: line.length };
