@@ -1,28 +1,21 @@
 """Surfaces of shapes for meshes: closed, outwards, of the right volume or area."""
 
 from collections import Counter
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from linkwind.log.surfaces import surface
-from linkwind.scenario.ears import triangles
-from linkwind.scenario.shapes import shape_of, signed_area
+from linkwind.scenario.shapes import shape_of
 
 DART = [[0.2, 0.0], [-0.1, 0.1], [0.0, 0.0], [-0.1, -0.1]]
 
 
 def corners(found):
-    """All cells as triangles, shape (m, 3, 3); a polygon by its ears, seen from its own side."""
-    pieces = []
-    for cell in found.cells:
-        points = found.point[cell]
-        across = np.argmax(np.abs(np.cross(points[1] - points[0], points[2] - points[0])))
-        flat = np.delete(points, across, axis=1)
-        turned = signed_area(flat) < 0.0
-        for ear in triangles(flat[::-1] if turned else flat):
-            pieces.append(points[::-1][list(ear)][::-1] if turned else points[list(ear)])
-    return np.array(pieces)
+    """All cells as fans of triangles, shape (m, 3, 3): right for convex ones only."""
+    fans = [(cell[0], a, b) for cell in found.cells for a, b in pairwise(cell[1:])]
+    return found.point[np.array(fans)]
 
 
 @pytest.mark.parametrize(
@@ -47,10 +40,14 @@ def test_a_closed_surface_has_every_edge_once_each_way_and_its_volume(shape, vol
     ("shape", "extent"),
     [
         ({"type": "plate", "length": 0.5, "span": 2.0}, [[-0.25, 0, -1], [0.25, 0, 1]]),
-        ({"type": "wing", "points": [[0, 0], [2, 3], [-1, 3]]}, [[-1, 0, 0], [2, 0, 3]]),
+        ({"type": "wing", "points": [[0, 0], [2, 3], [0, 1], [-1, 3]]}, [[-1, 0, 0], [2, 0, 3]]),
     ],
 )
-def test_a_sheet_is_one_cell_in_the_x_z_plane(shape, extent):
+def test_a_sheet_lies_in_the_x_z_plane_and_has_its_area(shape, extent):
     found = surface(shape_of(shape))
-    assert [sorted(cell) for cell in found.cells] == [list(range(len(found.point)))]
+    a, b, c = np.moveaxis(corners(found), 1, 0)
+    across = np.cross(b - a, c - a) / 2.0
+    assert not across[:, ::2].any()
+    assert abs(across[:, 1].sum()) == pytest.approx(np.abs(across[:, 1]).sum())
+    assert np.abs(across[:, 1]).sum() == pytest.approx(1.0 if shape["type"] == "plate" else 1.5)
     assert [found.point.min(axis=0).tolist(), found.point.max(axis=0).tolist()] == extent

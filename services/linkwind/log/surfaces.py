@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from linkwind.scenario.shapes import ROUND, AnyShape, Ellipsoid, Plate, Wing
+from linkwind.scenario.ears import triangles
+from linkwind.scenario.shapes import ROUND, AnyShape, Ellipsoid, Plate, Polygon, Wing
 from linkwind.spatial import Array
 
 
@@ -19,27 +20,27 @@ class Surface(NamedTuple):
 
 
 def surface(shape: AnyShape) -> Surface:
-    """Return the whole surface of a shape: of a plate and of a wing one cell, of the others a closed one."""
+    """Return the whole surface of a shape, in convex cells: of a plate and of a wing a sheet, else closed."""
     if isinstance(shape, Plate):
         x, z = 0.5 * shape.length, 0.5 * shape.span
-        return _sheet(np.array([[-x, -z], [x, -z], [x, z], [-x, z]]))
+        return Surface(np.array([[-x, 0, -z], [x, 0, -z], [x, 0, z], [-x, 0, z]]), [[0, 1, 2, 3]])
     if isinstance(shape, Wing):
-        return _sheet(shape.planform)
+        return Surface(np.insert(shape.planform, 1, 0.0, axis=1), [*map(list, triangles(shape.planform))])
     if isinstance(shape, Ellipsoid):
         return _ellipsoid(0.5 * np.array(shape.size))
-    return _prism(shape.outline(), 0.5 * shape.span)
+    outline = shape.outline()
+    whole = [list(range(len(outline)))]
+    end = [*map(list, triangles(outline))] if isinstance(shape, Polygon) else whole
+    return _prism(outline, 0.5 * shape.span, end)
 
 
-def _sheet(corners: Array) -> Surface:
-    return Surface(np.insert(corners, 1, 0.0, axis=1), [list(range(len(corners)))])
-
-
-def _prism(outline: Array, half: float) -> Surface:
-    """Return two ends and the sides between them."""
+def _prism(outline: Array, half: float, end: list[list[int]]) -> Surface:
+    """Return two ends, of cells of the outline's points, and the sides between them."""
     n = len(outline)
+    low, high = [cell[::-1] for cell in end], [[n + i for i in cell] for cell in end]
     point = np.concatenate([np.insert(outline, 2, z, axis=1) for z in (-half, half)])
     sides = [[i, j, n + j, n + i] for i, j in _around(n)]
-    return Surface(point, [list(range(n))[::-1], list(range(n, 2 * n)), *sides])
+    return Surface(point, [*low, *high, *sides])
 
 
 def _ellipsoid(half: Array) -> Surface:
