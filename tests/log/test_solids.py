@@ -79,6 +79,17 @@ def test_a_prism_is_closed_and_has_its_volume(data):
     assert volume == pytest.approx(signed_area(shape.outline()) * 0.4)
 
 
+def test_a_wing_has_two_sides():
+    """Its triangles seen from above, and the same from below, each of its area."""
+    primitive = drawn({"type": "wing", "points": [[x, -y] for x, y in DART]}, "triangles")
+    points = np.array([[p.x, p.y, p.z] for p in primitive.points])
+    a, b, c = np.moveaxis(points[np.array(primitive.indices).reshape(-1, 3)], 1, 0)
+    across = np.cross(b - a, c - a)[:, 1] / 2.0
+    assert across[across > 0.0].sum() == pytest.approx(0.02)
+    assert across[across < 0.0].sum() == pytest.approx(-0.02)
+    assert not points[:, 1].any()
+
+
 def test_pictures_have_their_size_and_place():
     lying = {"position": [0.0, 1.0, 0.0], "orientation": [2**-0.5, 2**-0.5, 0.0, 0.0]}  # its z is our -y
     pictures = [

@@ -37,6 +37,18 @@ def test_a_plate_is_one_sheet():
     assert np.abs(triangles[..., 1]).max() == 0.0
 
 
+def test_a_wing_is_its_planform():
+    """A dart, whose notch no triangle covers, off its centre of mass."""
+    points = [[1.0, 0.0], [2.0, 3.0], [1.0, 1.0], [0.0, 3.0]]
+    triangles = faces(shape_of({"type": "wing", "points": points}))
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    assert 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() == pytest.approx(1.0)
+    assert np.abs(triangles[..., 1]).max() == 0.0
+    pieces = cut(triangles, 2, 2.0)  # at z = 2: from x = 0.333 to 0.5 and from 1.5 to 1.667
+    assert np.linalg.norm(pieces[:, 1] - pieces[:, 0], axis=1).sum() == pytest.approx(1.0 / 3.0)
+    assert pieces[..., 0].min() == pytest.approx(1.0 / 3.0)
+
+
 @pytest.mark.parametrize(
     ("axis", "at", "area"), [(2, 0.3, 0.06), (2, 1.5, 0.0), (0, 0.05, 0.6), (1, 0.05, 0.8)]
 )

@@ -327,6 +327,16 @@ def test_bodies_without_a_shape_are_drawn_by_their_joints_or_their_radius_of_gyr
     np.testing.assert_allclose(np.linalg.norm(loose[0]["lines"][0]["points"], axis=1), 0.5)
 
 
+def test_a_wing_is_drawn_as_its_planform_and_filled_where_it_is():
+    """A dart: the triangle across its notch, of the corners 1, 2 and 3, is none of those that fill it."""
+    wing = {"type": "wing", "points": [[1.0, 0.0], [2.0, 3.0], [1.0, 1.0], [0.0, 3.0]]}
+    bodies = [{"name": name, "mass": 2.0, "inertia": 0.5, "shape": wing} for name in ("link1", "link2")]
+    body, _ = Page(render(planar(2, bodies=bodies))).data["scene"]["bodies"]
+    assert body["lines"] == [{"points": [[1, 0, 0], [2, 0, 3], [1, 0, 1], [0, 0, 3]], "closed": True}]
+    assert sorted(sorted(ear) for ear in body["ends"]) == [[0, 1, 2], [0, 2, 3]]
+    assert body["thick"]
+
+
 def test_the_tables_hold_the_scenario(page):
     described = scenario()
     raw = json.loads(page.texts["pre"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from linkwind.errors import LogError
 from linkwind.log.reader import Log, open_log
 from linkwind.log.vtk import export_vtk
 from linkwind.runs.run import run
-from linkwind.scenario import load
+from linkwind.scenario import load, loads
 
 
 def fly(name: str, folder: Path, *settings: str) -> Log:
@@ -72,6 +73,46 @@ def test_flow_and_bodies(tmp_path: Path) -> None:
             ends = sorted(points[2 * body : 2 * body + 2].tolist())
             expected = sorted((path.position[row, body] + side * along).tolist() for side in (-1, 1))
             np.testing.assert_allclose(ends, expected, atol=1e-12)
+
+
+BODIES = [
+    ("ball", '{ type = "ellipsoid", size = [1.2, 0.6, 0.4] }', (1.2, 0.6, 0.4)),
+    ("wing", '{ type = "wing", points = [[1.0, 0.0], [2.0, 3.0], [1.0, 1.0], [0.0, 3.0]] }', (2.0, 0.0, 3.0)),
+    ("plate", '{ type = "plate", length = 0.5, span = 1.5 }', (0.5, 0.0, 1.5)),
+    ("can", '{ type = "circle", diameter = 0.8, span = 0.3 }', (0.8, 0.8, 0.3)),
+    ("point", None, (0.0, 0.0, 0.0)),
+]
+
+
+def test_bodies_in_space_are_surfaces_with_a_point_at_the_centre_of_mass(tmp_path: Path) -> None:
+    text = "[time]\nend = 0.002\n[environment]\ngravity = [0.0, 0.0, 0.0]\n[coupling]\nstep = 1e-3\n"
+    for k, (name, shape, _) in enumerate(BODIES):
+        text += f'[[bodies]]\nname = "{name}"\nmass = 1.0\ninertia = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]\n'
+        text += f"position = [{5.0 * k}, 2.0, 3.0]\nvelocity = [0.0, {1.0 + k}, 0.0]\n"
+        text += f"shape = {shape}\n" if shape else ""
+    text += '[aero]\nmodel = "none"\n[bus]\ntransport = "inprocess"\n'
+    log = open_log(run(loads(text, "bodies.toml"), tmp_path / "out", lambda step: None).log)
+    (bodies,) = export_vtk(log, tmp_path / "vtk")
+    grid = read(vtkXMLUnstructuredGridReader(), collected(bodies)[0.0])
+    whose, centre = cells(grid, "body"), cells(grid, "centre")
+    assert np.flatnonzero(centre).size == len(BODIES)
+    assert np.array_equal(cells(grid, "velocity [m/s]")[:, 1], 1.0 + whose)
+    for k, (name, _, size) in enumerate(BODIES):
+        bounds = np.array([grid.GetCell(int(cell)).GetBounds() for cell in np.flatnonzero(whose == k)])
+        low, high = bounds[:, ::2].min(axis=0), bounds[:, 1::2].max(axis=0)
+        np.testing.assert_allclose(high - low, size, atol=1e-12, err_msg=name)
+        (middle,) = np.flatnonzero((whose == k) & (centre == 1))
+        np.testing.assert_allclose(grid.GetCell(int(middle)).GetBounds()[::2], [5.0 * k, 2.0, 3.0])
+    areas = [
+        sum(_area(grid.GetCell(int(c))) for c in np.flatnonzero((whose == k) & (centre == 0)))
+        for k in range(len(BODIES))
+    ]
+    assert areas[1:] == pytest.approx([1.0, 0.75, math.pi * (0.32 + 0.24), 0.0], rel=0.005)
+
+
+def _area(cell: Any) -> float:
+    points = vtk_to_numpy(cell.GetPoints().GetData())
+    return float(0.5 * np.linalg.norm(np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)))
 
 
 def test_without_frames_some_states(tmp_path: Path) -> None:

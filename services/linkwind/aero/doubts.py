@@ -15,7 +15,7 @@ WITHOUT_WIND = ("none", "field")  # models that read no wind from the scenario
 # Without the response a body wants so many times the mass of fluid that it accelerates, by the number of
 # lattice steps in a communication step; measured on free plates.
 WANTED = ((2, 1.0), (math.inf, 2.0))
-FEW = 10.0  # cells along the shorter side of a plate in space
+FEW = 10.0  # cells along the shorter side of a plate in space, or the mean width of a wing
 COARSE = 2.0  # panels that a wing goes in a step: above, lift after a sudden change is some percent off
 STEPS_A_GUST = 8.0  # that tell its shape: with fewer, a sine's largest value is missed by 8 % and more
 MANY_RINGS = 1500  # a step takes 0.6 s, and grows with the third power
@@ -108,14 +108,14 @@ def _few_cells(scenario: Scenario, provider: Provider) -> Iterator[str]:
     cell = grids.plan(scenario, provider).cell
     shapes = {body.name: body.shape for body in grids.bodies(scenario, provider)}
     sides = {
-        name: min(shape.reference_length, shape.span) / cell
+        name: grids.width(shape) / cell
         for name, shape in shapes.items()
         if shape is not None and not shape.closed
     }
     name = min(sides, key=sides.__getitem__, default="")
     if name and sides[name] < FEW:
         yield (
-            f'{item(scenario, provider, "flow", "cells")}: the shorter side of "{name}" has '
+            f'{item(scenario, provider, "flow", "cells")}: the mean width of "{name}" has '
             f"{sides[name]:.3g} cells, and with less than {FEW:g} forces are far off: with 8 along their "
             "chord a fruit fly's wings lift 0.6 of what they lift with 15. Use at least "
             f"{math.ceil(FEW / sides[name] * provider.flow.cells - 1e-9)}."

@@ -308,6 +308,15 @@ def test_export_says_what_it_leaves_out():
     assert (exported.links, exported.joints) == (3, 2)
 
 
+def test_export_leaves_out_a_wing_and_says_so():
+    points = "[[0.5, 0.0], [-0.5, 0.0], [-0.2, 1.0]]"
+    exported = export_urdf(
+        load("two_link", [f'bodies.link2.shape={{type="wing",points={points}}}', "aero.model=none"])
+    )
+    assert [remark.item for remark in exported.remarks if remark.what == "shapes"] == ["link2"]
+    assert exported.text.count("<visual>") == 1
+
+
 def test_a_spherical_joint_goes_out_as_three(tmp_path):
     text = random_urdf(1, n=3).replace('name="j2" type="fixed"', 'name="j2" type="spherical"')
     assert "spherical" in text

@@ -147,10 +147,15 @@ def moved(body: Body, grid: Grid) -> float:
     """
     shape = body.shape
     assert shape is not None
-    sides = (shape.reference_length, shape.span)
-    area = signed_area(shape.planform) if isinstance(shape, Wing) else sides[0] * sides[1]
-    volume = sides[0] ** 2 if grid.dimensions == 2 else min(sides) * area
+    length, span = shape.reference_length, shape.span
+    volume = length**2 if grid.dimensions == 2 else min(length, span) * max(length, span) * width(shape)
     return 0.25 * math.pi * grid.density * volume
+
+
+def width(shape: AnyShape) -> float:
+    """Return the shorter side of a plate or a cylinder seen along y, and the mean width of a wing [m]."""
+    sides = (shape.reference_length, shape.span)
+    return signed_area(shape.planform) / max(sides) if isinstance(shape, Wing) else min(sides)
 
 
 def _speed(body: Body, dimensions: int) -> float:

@@ -52,7 +52,7 @@ def _edge(corners: Array) -> tuple[Array, Array]:
     """Return points along an edge and unit vectors inwards, each shape (k, 2); at a notch a fan of them."""
     points, vectors = [], []
     following = np.roll(corners, -1, axis=0)
-    along = (following - corners) / np.linalg.norm(following - corners, axis=1)[:, None]
+    along = (following - corners) / np.hypot(*(following - corners).T)[:, None]
     inwards = np.column_stack([-along[:, 1], along[:, 0]])
     for k, (a, b) in enumerate(zip(corners, following, strict=True)):
         before, own = inwards[k - 1], inwards[k]
@@ -60,8 +60,8 @@ def _edge(corners: Array) -> tuple[Array, Array]:
             share = np.linspace(0.0, 1.0, 16)[:, None]
             fan = (1.0 - share) * before + share * own
             points.append(np.tile(a, (16, 1)))
-            vectors.append(fan / np.maximum(np.linalg.norm(fan, axis=1), 1e-9)[:, None])
-        count = max(1, int(np.ceil(np.linalg.norm(b - a) / FINE)))
+            vectors.append(fan / np.maximum(np.hypot(*fan.T), 1e-9)[:, None])
+        count = max(1, int(np.ceil(np.hypot(*(b - a)) / FINE)))
         points.append(a + (b - a) * ((np.arange(count) + 0.5) / count)[:, None])
         vectors.append(np.tile(own, (count, 1)))
     return np.concatenate(points), np.concatenate(vectors)
@@ -96,7 +96,7 @@ def _drawn_in(edge: Array, inwards: Array, by: Array) -> tuple[Array, Truths]:
         corner = _corner(points[k], along[k], points[following], along[following])
         if corner is not None:
             line.append(corner)
-            sharp.append(bool(along[k] @ along[following] < SHARP))
+            sharp.append(float((along[k] * along[following]).sum()) < SHARP)
     return np.array(line), np.array(sharp)
 
 
@@ -121,7 +121,7 @@ def _along(line: Array, sharp: Truths) -> Array:
     markers = []
     for a, b in pairwise([*np.flatnonzero(sharp).tolist(), len(line) - 1]):
         piece = line[a : b + 1]
-        length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(piece, axis=0), axis=1))])
+        length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(piece, axis=0).T))])
         count = max(1, round(float(length[-1]) / SPACING))
         at = length[-1] * np.arange(count) / count
         markers.append(np.column_stack([np.interp(at, length, values) for values in piece.T]))
