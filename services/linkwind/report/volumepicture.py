@@ -222,7 +222,8 @@ def _slice(ax: Axes, run: Run, volume: Volume, frame: VolumeFrame, plane: tuple[
     for triangles in body_faces(run, state):
         _body(ax, cut(triangles, normal, at)[..., [across, up]])
     ax.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), aspect="equal")
-    ax.locator_params(nbins=6)
+    ax.locator_params(axis="x", nbins=4)  # labels as long as 0.0025 stay apart
+    ax.locator_params(axis="y", nbins=6)
     return filled
 
 
