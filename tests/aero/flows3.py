@@ -18,6 +18,7 @@ HEAVY = "mass = 1e3\ninertia = [1e3, 1e3, 1e3, 0.0, 0.0, 0.0]"
 PLATE = '{ type = "plate", length = 1.0, span = 0.9 }'
 BALL = '{ type = "ellipsoid", size = [1.0, 0.8, 0.6] }'
 ROD = '{ type = "circle", diameter = 0.6, span = 1.0 }'
+KITE = '{ type = "wing", points = [[0.3, -0.5], [0.5, 0.0], [0.2, 0.5], [-0.5, 0.1]] }'
 WIND = (0.5, 0.3, -0.2)
 
 

@@ -114,7 +114,8 @@ def test_evaluated_again_for_another_iteration(lattice_steps):
 KERNELS = """
 import hashlib
 from tests.aero import flows, flows3
-runs = [flows3.driven(shape=shape, step=step) for shape in (flows3.BALL, flows3.ROD) for step in STEPS]
+shapes = (flows3.BALL, flows3.ROD, flows3.KITE)
+runs = [flows3.driven(shape=shape, step=step) for shape in shapes for step in STEPS]
 found = [run.go(flows3.swing, 5) for run in runs]
 found.append(flows.driven(shape='{ type = "ellipse", length = 1.0, width = 0.3 }').go(flows.swing, 5).wrench)
 print([hashlib.sha256(wrench.tobytes()).hexdigest() for wrench in found])
@@ -130,7 +131,7 @@ def test_the_kernels_of_blas_change_nothing():
         found.append(
             subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
         )
-    assert found[0].count(",") == 4
+    assert found[0].count(",") == 6
     assert found[0] == found[1]
 
 
