@@ -337,6 +337,14 @@ def test_a_wing_is_drawn_as_its_planform_and_filled_where_it_is():
     assert body["thick"]
 
 
+def test_an_ellipsoid_is_a_ball_for_views_in_space_unless_a_picture_is_there():
+    shape = {"type": "ellipsoid", "size": [0.5, 0.2, 0.3]}
+    bodies = [{"name": name, "mass": 2.0, "inertia": 0.5, "shape": shape} for name in ("link1", "link2")]
+    bodies[1]["picture"] = [{"type": "box", "size": [1.0, 1.0, 1.0]}]
+    found = Page(render(planar(2, bodies=bodies))).data["scene"]["bodies"]
+    assert [body["ball"] for body in found] == [[0.5, 0.2, 0.3], None]
+
+
 def test_the_tables_hold_the_scenario(page):
     described = scenario()
     raw = json.loads(page.texts["pre"])

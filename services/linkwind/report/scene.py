@@ -73,10 +73,17 @@ def _body(run: Run, index: int) -> dict[str, Any]:
         "name": body["name"],
         "mass": max(body["mass"], 1e-12),  # weights of a mean, which must not all be 0
         "lines": _as_data(lines),
+        "ball": _ball(body),
         "ends": _ends(body),
         "thick": not body.get("picture") and (body.get("shape") or {"type": "plate"})["type"] in SHEETS,
         "reach": float(np.linalg.norm(points[:, : 2 if flat(run) else 3], axis=1).max()),
     }
+
+
+def _ball(body: Mapping[str, Any]) -> tuple[float, float, float] | None:
+    """Return the sizes of a body that is an ellipsoid [m], else None."""
+    shape = None if body.get("picture") else shape_of(body.get("shape"))
+    return shape.size if isinstance(shape, Ellipsoid) else None
 
 
 def _ends(body: Mapping[str, Any]) -> list[tuple[int, int, int]] | None:

@@ -5,12 +5,31 @@ import { add, around, joined, length, number, turned } from "/report/motion.js";
 import { tips } from "/report/wake.js";
 
 const SIDES = 10; // of the head of an arrow
+const ROUND = 32; // points around an ellipsoid
 const ARROW = 0.14; // of the room's side, the longest arrow: it stays in the room wherever it begins
 const FRAME = 30; // ms between two pictures at least
 const LEVELS = 127; // of circulation and vorticity, above 0
 
+// Triangles over an ellipsoid: rings about its z axis, and the poles.
+function ellipsoid(size) {
+  const points = [-1, 1].map((pole) => [0, 0, 0.5 * pole * size[2]]), triangles = [];
+  const ring = (row) => 2 + ROUND * row, rows = ROUND / 2 - 1;
+  for (let row = 0; row < rows; row++) {
+    const angle = Math.PI * (row + 1) / (rows + 1), across = 0.5 * Math.sin(angle);
+    for (let i = 0; i < ROUND; i++) {
+      const turn = 2 * Math.PI * i / ROUND, j = (i + 1) % ROUND, a = ring(row), b = ring(row + 1);
+      points.push([across * Math.cos(turn) * size[0], across * Math.sin(turn) * size[1], -0.5 * Math.cos(angle) * size[2]]);
+      if (row === 0) triangles.push([0, a + j, a + i]);
+      if (row === rows - 1) triangles.push([a + i, a + j, 1]);
+      else triangles.push([a + i, a + j, b + j], [a + i, b + j, b + i]);
+    }
+  }
+  return { points, triangles };
+}
+
 // Triangles over closed lines of a body: caps, and sides between the two faces of an outline.
 function facesOf(body) {
+  if (body.ball) return ellipsoid(body.ball);
   const points = [], triangles = [];
   const loops = body.lines.filter(({ closed, points }) => closed && points.length > 2).map(({ points: line }) => {
     const start = points.length;
