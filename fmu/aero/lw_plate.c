@@ -98,21 +98,39 @@ static void add_added_mass(double mass, double inertia, lw_vec3 v, lw_vec3 omega
     torque->z -= v.x * p;
 }
 
-/* How a plate moves: in W, and its angular velocity in the body frame as well. */
+/* How a plate or wing moves: in W, and its angular velocity in the body frame as well. */
 typedef struct {
     lw_vec3 position, linear, angular;
     lw_mat3 rotation;
     lw_vec3 omega;
 } plate_motion;
 
-/* Force on a strip whose centre is at z of the span, and torque about the plate's centre, in the body frame.
- * Where z is zero nothing is added to anything, so that one strip has the bits of a plate without strips. */
-static void strip_wrench(const lw_plates *plates, double t, const plate_motion *plate, double chord,
-                         double span, double z, lw_vec3 *force, lw_vec3 *torque) {
+/* A strip: its chord and width, and where its centre is in the body frame [m]. */
+typedef struct { double chord, span, x, z; } plate_strip;
+
+/* Strip k of plate or wing i, from -z on. */
+static plate_strip strip_of(const lw_plates *plates, int i, int k) {
+    const int n = plates->strips;
+    const double chord = plates->size[2 * i], span = plates->size[2 * i + 1];
+    plate_strip strip = {chord, span / n, 0.0, span * (2 * k + 1 - n) / (2 * n)};
+    if (plates->planform) {
+        const double *row = plates->planform + 3 * (i * n + k);
+        strip.chord *= row[0];
+        strip.x = chord * row[1];
+        strip.z += span * row[2];
+    }
+    return strip;
+}
+
+/* Force on a strip, and torque about the centre of mass, in the body frame. Where x or z is zero nothing is added
+ * to anything, so that one strip has the bits of a plate without strips. */
+static void strip_wrench(const lw_plates *plates, double t, const plate_motion *plate, plate_strip strip,
+                         lw_vec3 *force, lw_vec3 *torque) {
     const lw_vec3 omega = plate->omega;
+    const double chord = strip.chord, span = strip.span, x = strip.x, z = strip.z;
     lw_vec3 position = plate->position, velocity = plate->linear;
-    if (z != 0.0) {
-        const lw_vec3 arm = lw_mat_vec(plate->rotation, lw_vec(0.0, 0.0, z));
+    if (x != 0.0 || z != 0.0) {
+        const lw_vec3 arm = lw_mat_vec(plate->rotation, lw_vec(x, 0.0, z));
         position = lw_add(position, arm);
         velocity = lw_add(velocity, lw_cross(plate->angular, arm));
     }
@@ -124,15 +142,16 @@ static void strip_wrench(const lw_plates *plates, double t, const plate_motion *
     const lw_added_mass added = lw_plate_added_mass(plates->density, chord, span, 1);
     *force = lw_vec(planar.x, planar.y, 0.0), *torque = lw_vec(0.0, 0.0, planar.torque);
     if (z != 0.0) rate -= z * omega.y * omega.z; /* (omega x (omega x r)) . n */
+    if (x != 0.0) rate -= x * omega.y * omega.x;
     add_added_mass(added.normal, added.span, v, omega, rate, force, torque);
     if (z != 0.0) *torque = lw_add(*torque, lw_vec(-z * force->y, z * force->x, 0.0));
+    if (x != 0.0) *torque = lw_add(*torque, lw_vec(0.0, -x * force->z, x * force->y));
 }
 
 static int evaluate(const lw_plates *plates, int i, double t, const lw_motion *motion,
                     lw_unaligned *force, lw_unaligned *torque) {
     const int32_t b = plates->body[i];
     const int n = plates->strips;
-    const double chord = plates->size[2 * i], span = plates->size[2 * i + 1];
     plate_motion plate = {lw_load3(motion->position + 3 * b), lw_load3(motion->linear + 3 * b),
                           lw_load3(motion->angular + 3 * b),
                           lw_quat_matrix(lw_load4(motion->orientation + 4 * b)), {0.0, 0.0, 0.0}};
@@ -140,8 +159,7 @@ static int evaluate(const lw_plates *plates, int i, double t, const lw_motion *m
     lw_vec3 f = {0.0, 0.0, 0.0}, m = {0.0, 0.0, 0.0};
     for (int k = 0; k < n; ++k) { /* from -z to z */
         lw_vec3 strip_f, strip_m;
-        const double z = span * (2 * k + 1 - n) / (2 * n);
-        strip_wrench(plates, t, &plate, chord, span / n, z, &strip_f, &strip_m);
+        strip_wrench(plates, t, &plate, strip_of(plates, i, k), &strip_f, &strip_m);
         f = k ? lw_add(f, strip_f) : strip_f;
         m = k ? lw_add(m, strip_m) : strip_m;
     }
@@ -158,6 +176,28 @@ lw_added_mass lw_plate_added_mass(double density, double chord, double span, int
     return added;
 }
 
+static void plate_inertia(const lw_plates *plates, int i, lw_unaligned *a) {
+    const double *size = plates->size + 2 * i;
+    const lw_added_mass added = lw_plate_added_mass(plates->density, size[0], size[1], plates->strips);
+    a[1 * 6 + 1] = added.normal;
+    a[3 * 6 + 3] = added.chord;
+    a[5 * 6 + 5] = added.span;
+}
+
+/* The sum of the strips' own, carried to the centre of mass: w of a strip is w - z omega_x + x omega_z. */
+static void wing_inertia(const lw_plates *plates, int i, lw_unaligned *a) {
+    static const int at[] = {1, 3, 5}; /* w, omega_x, omega_z among the six */
+    for (int k = 0; k < plates->strips; ++k) {
+        const plate_strip strip = strip_of(plates, i, k);
+        const lw_added_mass added = lw_plate_added_mass(plates->density, strip.chord, strip.span, 1);
+        const double carried[] = {1.0, -strip.z, strip.x};
+        for (int row = 0; row < 3; ++row)
+            for (int column = 0; column < 3; ++column)
+                a[at[row] * 6 + at[column]] += added.normal * (carried[row] * carried[column]);
+        a[5 * 6 + 5] += added.span;
+    }
+}
+
 int lw_plates_evaluate(const lw_plates *plates, double t, const lw_motion *motion,
                        const lw_wrench *wrench) {
     int status = 0;
@@ -166,13 +206,9 @@ int lw_plates_evaluate(const lw_plates *plates, double t, const lw_motion *motio
             status = 1 + i;
         }
         if (wrench->added_inertia) {
-            const lw_added_mass added = lw_plate_added_mass(plates->density, plates->size[2 * i],
-                                                            plates->size[2 * i + 1], plates->strips);
             lw_unaligned *a = wrench->added_inertia + 36 * i;
             memset(a, 0, 36 * sizeof *a);
-            a[1 * 6 + 1] = added.normal;
-            a[3 * 6 + 3] = added.chord;
-            a[5 * 6 + 5] = added.span;
+            (plates->planform ? wing_inertia : plate_inertia)(plates, i, a);
         }
     }
     return status;

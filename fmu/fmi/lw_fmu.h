@@ -94,6 +94,8 @@ extern const int32_t lw_fmu_aero_model;
 extern const int32_t lw_fmu_coefficients; /* LW_PLATE_... */
 extern const int32_t lw_fmu_strips, lw_fmu_curve_size;
 extern const double lw_fmu_curves[];      /* (3, curve_size) as lw_plate.h */
+extern const int32_t lw_fmu_planform_size;
+extern const double lw_fmu_planform[];    /* (n, strips, 3) as lw_plate.h, or none */
 extern const int32_t lw_fmu_gust_count;
 extern const double lw_fmu_gusts[];       /* (gust_count, 9) as lw_wind.h */
 extern const int32_t lw_fmu_field_start[]; /* (n + 1) as lw_field.h; the bodies are 0 ... n - 1 */

@@ -12,7 +12,7 @@ struct lw_part {
     uint32_t first[LW_AERO_SECTIONS + 1];
     lw_plates plates;
     lw_field field;
-    double *size;  /* (n, 2) chord and span [m] */
+    double *size;  /* (n, 2) chord, of a wing the mean one, and span [m] */
     int32_t *body; /* (n) 0 ... n - 1 */
 };
 
@@ -65,6 +65,7 @@ void lw_part_create(lw_instance *instance) {
     part->plates.curve_size = lw_fmu_curve_size;
     part->plates.curves = lw_fmu_curves;
     part->plates.size = part->size;
+    part->plates.planform = lw_fmu_planform_size ? lw_fmu_planform : NULL;
     part->plates.wind.n_gusts = lw_fmu_gust_count;
     part->plates.wind.gusts = lw_fmu_gusts;
 }

@@ -183,7 +183,7 @@ def test_a_body_that_is_no_plate_is_refused():
     scenario = loads(PLATE, "scene")
     body = scenario.bodies[0].model_copy(update={"shape": None})
     broken = scenario.model_copy(update={"bodies": (body,)})
-    expected = r'scene: bodies\[0\] "plate"\.shape: expected type "plate" with length and span.*got none'
+    expected = r'scene: bodies\[0\] "plate"\.shape: expected type "plate" or "wing".*got none'
     with pytest.raises(ScenarioError, match=expected):
         aero.build(broken, broken.providers[0])
 

@@ -265,3 +265,30 @@ def test_a_wing_on_an_arm_bears_the_forces_of_a_plate_that_is_there():
     moved[:3, 3:] = -np.cross(np.eye(3), arm)  # ω × r
     response = moved.T @ expected.response @ moved
     np.testing.assert_allclose(found.response, response, rtol=0, atol=1e-11)
+
+
+def test_a_wing_on_an_arm_flies_as_a_plate_on_a_fixed_joint(tmp_path):
+    """But for where the mean force of a step stands in it: a difference of second order."""
+    text = WING.replace("[coupling]", f"""[[bodies]]
+name = "sail"
+mass = 0.0
+inertia = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+shape = {{ type = "plate", length = 0.4, span = 1.2 }}
+[[joints]]
+name = "weld"
+type = "fixed"
+parent = "wing"
+child = "sail"
+parent_point = {ARM.tolist()}
+[coupling]""")  # fmt: skip
+    off = []
+    for step in (0.02, 0.01):
+        same = [f"coupling.step={step}", "bodies.wing.angular_velocity=[0.5,1.0,2.0]"]
+        one = fly(tmp_path / f"one{step}", *same, MOVED)
+        scenario = loads(text, "wing.toml", [*same, 'aero.bodies=["sail"]'])
+        outcome = linkwind.run(scenario, tmp_path / f"two{step}", report=False)
+        two = linkwind.open_log(outcome.log).trajectory()
+        off.append(np.abs(one.position[-1, 0] - two.position[-1, 0]).max())
+    assert np.ptp(one.linear[:, 0], axis=0).max() > 0.1
+    assert off[1] < 1e-4
+    assert off[0] / off[1] > 3.0

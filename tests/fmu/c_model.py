@@ -203,6 +203,9 @@ def aero(table: PlateTable | FieldTable, theta=(), *, scalar=False) -> Model:
     )
     constants += f"const int32_t lw_fmu_strips = {strips}, lw_fmu_curve_size = {curves.shape[1]};\n"
     constants += _array("double", "curves", curves)
+    planform = table.planform if plate else np.zeros(0)
+    constants += f"const int32_t lw_fmu_planform_size = {planform.size};\n"
+    constants += _array("double", "planform", planform)
     constants += f"const int32_t lw_fmu_gust_count = {len(gusts)};\n" + _array("double", "gusts", gusts)
     constants += _array("int32_t", "field_start", field[0]) + _array("int32_t", "field_code", field[1])
     constants += _array("double", "field_constants", field[2])

@@ -60,15 +60,18 @@ GUSTS = (
     "{shape='one_minus_cosine',amplitude=[0.5,0.2,0],frequency=2,wavenumber=[0.3,0,0],phase_deg=90}]"
 )
 TABLE = "[[0,0,0.05,0],[10,0.8,0.1,0],[45,1,1,-0.25],[90,0,1.9,-0.475]]"
+WINGS = [
+    f'bodies.link{i}.shape={{type="wing",points=[[{i},0],[0.5,1],[-0.2,0.7],[-0.1,-0.3]]}}' for i in (1, 2)
+]
 STRIPS = ["aero.plate.strips=3", "aero.plate.coefficients=table", f"aero.plate.table={TABLE}"]
 
 
-@pytest.fixture(scope="module", params=[[], STRIPS], ids=["plate", "strips"])
+@pytest.fixture(scope="module", params=[[], STRIPS, STRIPS + WINGS[:1], WINGS])
 def plate(compiler, request):
     scenario = load("two_link", [GUSTS, *request.param])
     table = plate_table(scenario, scenario.providers[0])
     model = aero(table)
-    return table, model, compiler.library(model, 3, f"plate{table.strips}")
+    return table, model, compiler.library(model, 3, f"plate{table.strips}{table.planform.size}")
 
 
 @pytest.fixture(scope="module")
@@ -105,6 +108,12 @@ def test_plate_parameters(plate):
     added = fmu.get("ADDED_INERTIA")
     fmu.set("DENSITY", 2 * fmu.get("DENSITY"))
     np.testing.assert_allclose(fmu.get("ADDED_INERTIA"), 2 * added, rtol=1e-15)
+    fmu.set("LENGTH", 2 * fmu.get("LENGTH"))  # the chord has the second power, and is the arm
+    added = 2 * added.reshape(2, 6, 6)
+    for row, column in np.ndindex(6, 6):
+        turns = (row == 5) + (column == 5)
+        added[:, row, column] *= 4.0 * 2.0**turns
+    np.testing.assert_allclose(fmu.get("ADDED_INERTIA"), added.ravel(), rtol=1e-14)
     for section, value in (("DENSITY", [-1.0]), ("LENGTH", [0.5, 0.0]), ("SPAN", [-1.0, 1.0])):
         before = fmu.get(section)
         fmu.set(section, value)

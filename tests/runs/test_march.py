@@ -66,12 +66,14 @@ def of(name: str, *settings: str) -> Scenario:
 
 
 PLATE, FIELD, NONE = "two_link", "two_link_field", "four_bar"
+WING = 'bodies.link1.shape={type="wing",points=[[-0.2,-0.5],[0.3,-0.4],[0.2,0.5]]}'
 REGULAR = [(name, ()) for name in (
     "andrews", "bricard", "chain", "flapper", "four_bar", "stage_separation", "two_link", "two_link_field",
     "two_link_free", "two_link_gust",
 )] + [
     *((name, (f"coupling.order={order}",)) for order in range(3) for name in (PLATE, FIELD)),
     (PLATE, ("coupling.adaptive=false",)),
+    (PLATE, (WING, "aero.plate.strips=3")),
     (PLATE, ("coupling.step=0.004", "coupling.order=3")),
     *((name, (f"dynamics.integrator={how}",)) for how in ("euler", "semi_implicit_euler", "dopri5", "radau5")
       for name in (PLATE, NONE)),

@@ -6,6 +6,7 @@ z. A plate is a rectangle about the centre of mass, a wing any polygon that no l
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -61,11 +62,29 @@ def chord(shape: Thin, z: float) -> tuple[float, float]:
 def strips(shape: Thin, count: int) -> Array:
     """Return mean chord and centre of area (x, z) of equal strips of the span, from -z on, (count, 3)."""
     if isinstance(shape, Plate):
-        places = [shape.span * (2 * k + 1 - count) / (2 * count) for k in range(count)]
-        return np.array([(shape.length, 0.0, z) for z in places])
+        return np.array([(shape.length, 0.0, z) for z in _evenly(shape.span, count)])
     low, high = ends(shape)
     inner = [low + (high - low) * k / count for k in range(1, count)]
     return np.array([_strip(shape, a, b) for a, b in pairwise([low, *inner, high])])
+
+
+def relative(shapes: Sequence[Thin], count: int) -> Array:
+    """Return the strips of shapes as ``native.forces.PlateTable`` has them, shape (n, count, 3).
+
+    Over mean chord and span, so that they stay what they are where an FMU's user scales these.
+
+    Returns:
+        Chord, x of the centre, and by how much z of it is more than that of a plate's strip; (0, 0, 3) where
+        all are plates.
+    """
+    if all(isinstance(shape, Plate) for shape in shapes):
+        return np.zeros((0, 0, 3))
+    found = np.zeros((len(shapes), count, 3))
+    for rows, shape in zip(found, shapes, strict=True):
+        chord, x, z = strips(shape, count).T
+        mean = mean_chord(shape)
+        rows[:] = np.column_stack([chord / mean, x / mean, (z - _evenly(shape.span, count)) / shape.span])
+    return found
 
 
 def mean_chord(shape: Thin) -> float:
@@ -83,6 +102,10 @@ def ends_and_middle(shape: Thin) -> Array:
     low, high = ends(shape)
     halfway = 0.5 * (low + high)
     return np.array([_tip(shape, low), (0.5 * sum(chord(shape, halfway)), halfway), _tip(shape, high)])
+
+
+def _evenly(span: float, count: int) -> list[float]:
+    return [span * (2 * k + 1 - count) / (2 * count) for k in range(count)]
 
 
 def _tip(shape: Thin, z: float) -> tuple[float, float]:

@@ -8,50 +8,42 @@ from __future__ import annotations
 import numpy as np
 
 from linkwind.aero.base import Capabilities, body_indices
+from linkwind.aero.planform import mean_chord, relative, thin
 from linkwind.aero.section import curves
 from linkwind.aero.wind import wind_table
-from linkwind.errors import ProtocolError, ScenarioError, SimulationError
+from linkwind.errors import ProtocolError, SimulationError
 from linkwind.native.forces import Coefficients, Plates, PlateTable
 from linkwind.scenario import Provider, Scenario
 from linkwind.spatial import Motion, Wrench
 
 
 def plate_table(scenario: Scenario, provider: Provider) -> PlateTable:
-    """Return the constants of the plates of a provider.
+    """Return the constants of the plates and wings of a provider.
 
     Raises:
-        ScenarioError: a body is not a plate, or the coefficient set is unknown.
+        ScenarioError: a body is neither plate nor wing.
     """
-    indices = body_indices(scenario, provider)
-    size = []
-    for index in indices:
-        shape = scenario.bodies[index].shape
-        if shape is None or shape.type != "plate":
-            got = f'type "{shape.type}"' if shape else "none"
-            raise ScenarioError(
-                f'{scenario.where("bodies", index)}.shape: expected type "plate" with length and span, '
-                f'for aero model "plate"; got {got}. Add shape = {{ type = "plate", length = … }}.'
-            )
-        size.append((shape.length, shape.span))
-    plate = provider.plate
+    shapes, plate = thin(scenario, provider), provider.plate
     tabulated = plate.table if plate.coefficients == "table" else None
     return PlateTable(
-        body=np.array(indices, dtype=np.int32),
-        size=np.array(size),
+        body=np.array(body_indices(scenario, provider), dtype=np.int32),
+        size=np.array([(mean_chord(shape), shape.span) for shape in shapes]),
         coefficients=Coefficients[plate.coefficients.upper()],
         density=scenario.environment.density,
         wind=wind_table(scenario.environment),
         strips=plate.strips,
         curves=np.zeros((3, 0)) if tabulated is None else curves(tabulated),
+        planform=relative(shapes, plate.strips),
     )
 
 
 class Plate:
-    """Quasi-steady forces on the strips of flat plates: blade elements.
+    """Quasi-steady forces on the strips of flat plates and wings: blade elements.
 
     The wrench holds circulatory lift, drag, rotational terms and the velocity part of the added mass; the
     acceleration part is returned as added inertia: m = π ρ (c/2)² s along the normal, m (c/2)² / 8 about the
-    span and m s² (1 - 1/N²) / 12 about the chord, for a plate of chord c and span s in N strips.
+    span and m s² (1 - 1/N²) / 12 about the chord, for a plate of chord c and span s in N strips. A strip of a
+    wing has its own mean chord and acts at its centre of area.
 
     Sources: H. Li, T. Goodwill, Z. J. Wang, L. Ristroph, J. Fluid Mech. 937, A6 (2022),
     doi:10.1017/jfm.2022.89 (``ristroph``); A. Andersen, U. Pesavento, Z. J. Wang, J. Fluid Mech. 541, 65

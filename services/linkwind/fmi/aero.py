@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from linkwind.aero.field import field_table
+from linkwind.aero.planform import thin
 from linkwind.aero.plate import plate_table
 from linkwind.fmi import units
 from linkwind.fmi.dynamics import ADDED_INERTIA_ELEMENTS, TIME, VECTOR, output, parameter, vector_input
@@ -18,6 +19,18 @@ from linkwind.native.forces import VARIABLES, FieldTable
 from linkwind.native.multibody import Multibody
 from linkwind.scenario import Provider, Scenario
 from linkwind.spatial import Motion
+
+# What length and span are, by the type of the shape.
+_SIDES = {
+    "plate": (
+        "Length of the plate {}, chord, along x of the body frame",
+        "Span of the plate {}, along z of the body frame",
+    ),
+    "wing": (
+        "Mean chord of the wing {}, along x of the body frame, with which its planform scales",
+        "Span of the wing {}, along z of the body frame, with which its planform scales",
+    ),
+}
 
 # What a variable of a field's expressions is read from.
 _READ_FROM = {
@@ -104,13 +117,14 @@ def _reads(table: FieldTable, i: int, body: str) -> Dependences:
 def _parameters(scenario: Scenario, provider: Provider) -> Iterator[Variable]:
     if provider.model != "plate":
         return
-    environment, size = scenario.environment, plate_table(scenario, provider).size
+    environment, shapes = scenario.environment, thin(scenario, provider)
+    size = plate_table(scenario, provider).size
     density, wind = environment.density, np.array(environment.wind)
     yield parameter("density", "DENSITY", 0, density, units.DENSITY, "Density of the fluid")
     yield parameter("wind", "WIND", 0, wind, units.VELOCITY, "Velocity of the undisturbed fluid, in W")
     for i, body in enumerate(provider.bodies):
-        for column, (what, side) in enumerate((("length", "chord, along x"), ("span", "along z"))):
+        for column, what in enumerate(("length", "span")):
             yield parameter(
                 f"{body}.{what}", what.upper(), i, float(size[i, column]), units.LENGTH,
-                f"{what.capitalize()} of the plate {body}, {side} of the body frame",
+                _SIDES[shapes[i].type][column].format(body),
             )  # fmt: skip

@@ -146,7 +146,9 @@ def _plate(provider: Provider) -> str:
         f"(along z) and normal along y, in a quasi-steady flow. Its span is {count}; each meets the air with "
         f"the velocity of its own centre. {_SETS[plate.coefficients]}</p>{table}<p>With n strips, the "
         "added mass m = π ρ (c/2)² s along the normal and the added inertia m (c/2)²/8 about the span and "
-        "m s² (1 − 1/n²)/12 about the chord act on the acceleration and are returned as the matrix A.</p>"
+        "m s² (1 − 1/n²)/12 about the chord act on the acceleration and are returned as the matrix A. A wing "
+        "has its mean chord for c; its strips have chords of their own and act at their centres of area, all "
+        "of which scale with c and s, and A is their sum, moved to the centre of mass.</p>"
     )
 
 

@@ -179,15 +179,27 @@ def _plate_constants(scenario: Scenario, provider: Provider) -> dict[str, Table]
     gusts = wind_table(scenario.environment).gusts
     wind: dict[str, Table] = {"gust_count": len(gusts), "gusts": gusts}
     if provider.model != "plate":
-        return {"coefficients": 0, "strips": 0, "curve_size": 0, "curves": np.zeros(0), **wind}
+        return {
+            "coefficients": 0,
+            "strips": 0,
+            "curve_size": 0,
+            "curves": np.zeros(0),
+            **_planform(np.zeros(0)),
+            **wind,
+        }
     plates = plate_table(scenario, provider)
     return {
         "coefficients": int(plates.coefficients),
         "strips": plates.strips,
         "curve_size": plates.curves.shape[1],
         "curves": plates.curves,
+        **_planform(plates.planform),
         **wind,
     }
+
+
+def _planform(rows: Array) -> dict[str, Table]:
+    return {"planform_size": rows.size, "planform": rows}
 
 
 def _field_constants(scenario: Scenario, provider: Provider) -> dict[str, Table]:

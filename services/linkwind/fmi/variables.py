@@ -16,8 +16,8 @@ link1.a           3           acceleration dv/dt [m/s²]
 link1.alpha       3           angular acceleration dw/dt [rad/s²]
 link1.mass        1           [kg]
 link1.inertia     6           Ixx, Iyy, Izz, Ixy, Ixz, Iyz, body frame, about the centre of mass [kg·m²]
-link1.length      1           chord of the plate [m] (aero)
-link1.span        1           span of the plate [m] (aero)
+link1.length      1           chord of the plate, or mean one of the wing [m] (aero)
+link1.span        1           span of it [m] (aero)
 ================= =========== ==================================================================
 
 and for a joint ``hinge``:

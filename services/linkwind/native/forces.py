@@ -34,17 +34,20 @@ class Coefficients(enum.IntEnum):
 
 @dataclass(frozen=True)
 class PlateTable:
-    """Flat plates in a wind.
+    """Flat plates and wings in a wind.
 
     Attributes:
         body: index of each plate among all bodies, shape (n,).
-        size: chord and span [m], shape (n, 2).
+        size: chord, of a wing the mean one, and span [m], shape (n, 2).
         coefficients: the coefficient set of all plates.
         density: of the fluid [kg/m³].
         wind: the wind that all plates are in.
         strips: that the span of each plate is cut into.
         curves: of TABLE: C_l, C_d and C_m about the middle of the chord, nose up, over the angle of attack
             -π … π, each as ``expression.curves`` lays it out, shape (3, any).
+        planform: of each strip, chord and x of its centre over the mean chord, and by how much z of it, over
+            the span, is more than that of a plate's strip, whose row is (1, 0, 0), shape (n, strips, 3);
+            (0, 0, 3) where all are plates.
     """
 
     body: Indices
@@ -54,6 +57,7 @@ class PlateTable:
     wind: WindTable
     strips: int = 1
     curves: Array = field(default_factory=lambda: np.zeros((3, 0)))
+    planform: Array = field(default_factory=lambda: np.zeros((0, 0, 3)))
 
 
 @dataclass(frozen=True)
@@ -95,6 +99,7 @@ class _Plates(ctypes.Structure):
         ("curve_size", ctypes.c_int),
         ("body", ctypes.c_void_p),
         ("size", ctypes.c_void_p),
+        ("planform", ctypes.c_void_p),
         ("curves", ctypes.c_void_p),
         ("density", ctypes.c_double),
         ("wind", WindStruct),
@@ -139,7 +144,7 @@ def _index_address(array: Indices) -> int:
 
 
 class Plates:
-    """Quasi-steady flat plates.
+    """Quasi-steady flat plates and wings.
 
     Attributes:
         at: address of the ``lw_plates``.
@@ -155,6 +160,7 @@ class Plates:
             table.curves.shape[1],
             _index_address(self._body),
             address(table.size),
+            address(table.planform) if table.planform.size else None,
             address(table.curves) if table.curves.size else None,
             table.density,
             WindStruct.of(table.wind),
