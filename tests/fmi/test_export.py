@@ -87,6 +87,19 @@ def test_references_of_other_models(fmu, name, part, fmi):
 
 
 @pytest.mark.parametrize("fmi", ["2", "3"])
+def test_the_forces_on_a_wing_have_the_bits_of_the_library(tmp_path, fmi):
+    """One wing, away from its centre of mass, beside two plates, all in eight strips."""
+    wing = 'bodies.left_wing.shape={type="wing",points=[[-0.1,-0.3],[0.1,-0.3],[0.12,0.1],[0.05,0.35]]}'
+    flapper = load("flapper", [wing])
+    out = export(flapper, tmp_path / "wing.fmu", fmi=fmi, part="aero").file
+    assert reference_error(out) == 0.0
+    with zipfile.ZipFile(out) as archive:
+        text = archive.read("modelDescription.xml").decode()
+    assert "Mean chord of the wing left_wing" in text
+    assert "Length of the plate right_wing" in text
+
+
+@pytest.mark.parametrize("fmi", ["2", "3"])
 def test_a_motion_by_table_has_the_bits_of_the_core(tmp_path, fmi):
     table = "{ table = [[0, 0], [0.05, 0.3], [0.07, 0.1], [0.1, 1e-17]], periodic = true }"
     text = f"""
