@@ -42,9 +42,9 @@ def _stream(
 
 
 def stream(short: bool) -> Findings:
-    """The drag of a sphere that stands in a stream, in a window of 11 by 8 by 8 diameters."""
+    """The drag of a sphere that stands in a stream, in a window of 12 by 8 by 8 diameters."""
     rows, curves = [], []
-    cells, window, end = (8, (11.0, 8.0, 8.0), 8.0) if short else (12, (11.0, 8.0, 8.0), 12.0)
+    cells, window, end = (8, (12.0, 8.0, 8.0), 8.0) if short else (12, (12.0, 8.0, 8.0), 12.0)
     for re in (100,) if short else (20, 100, 200):
         t, drag, wrench = _stream(re, cells, window, end)
         case, late = f"sphere in a stream, Re {re}", t > end - 1.0
@@ -60,8 +60,8 @@ def stream(short: bool) -> Findings:
 def converging(short: bool) -> Findings:
     """The drag of a sphere at Re 100 on finer and finer grids, and in larger and larger windows."""
     del short
-    sizes, middle = (8, 12, 16, 20), (7.0, 6.0, 6.0)
-    windows = ((5.0, 5.0, 5.0), middle, (9.0, 7.0, 7.0), (11.0, 8.0, 8.0))
+    sizes, middle = (8, 12, 16, 20), (8.0, 6.0, 6.0)  # all whole numbers of 16 × 8 × 8 cells
+    windows = ((4.0, 4.0, 4.0), middle, (12.0, 8.0, 8.0))
     drags = np.array([_last(_stream(100.0, n, middle, 8.0)) for n in sizes])
     wide = [float(drags[1]) if side == middle else _last(_stream(100.0, 12, side, 8.0)) for side in windows]
     case = "sphere in a stream, Re 100"
@@ -74,7 +74,7 @@ def converging(short: bool) -> Findings:
     right = Curve("drag law", lengths, np.full(len(lengths), law(100.0)), True)
     curves = (Curve("linkwind", lengths, np.array(wide)), right)
     title, drag_of = "Sphere, Re 100", "drag coefficient"
-    grid = (Curve("linkwind, window of 7 diameters", np.array(sizes, float), drags),)
+    grid = (Curve("linkwind, window of 8 × 6 × 6", np.array(sizes, float), drags),)
     plots = [
         Plot(f"{title}: grid", "cells across", drag_of, grid),
         Plot(f"{title}: window, 12 cells across", "length of the window / D", drag_of, curves),

@@ -1,7 +1,8 @@
 """Thin wings at large angles, and bodies so long that their middle feels a flow in the plane.
 
-The three cells that a marker moves make a plate act as if it were some 1.6 cells thick: the force along the
-plate is too large with few cells, so that lift and drag are only reported, with how they converge.
+The cells that a marker moves make a plate act as if it were some 1.5 cells thick in a steady shear. So the
+force along a plate is too large with few cells: held to the measurement is the normal force; lift and drag are
+reported beside it, with how they converge, and held to a computation once there are cells enough.
 """
 
 from __future__ import annotations
@@ -70,10 +71,10 @@ def _rows(angle: int, chord: int, coefficients: Array, within: float) -> list[Ro
     across = np.array([math.cos(math.radians(angle)), math.sin(math.radians(angle))])
     normal, right = float(coefficients @ across), float(across @ MEASURED[angle])
     rows = [Row(case, "normal force coefficient", normal, right, within, TAIRA)]
-    for published, source in ((MEASURED, TAIRA), (COMPUTED, PETIBM)):
+    for published, source, allowed in ((MEASURED, TAIRA, None), (COMPUTED, PETIBM, within)):
         for name, value, other in zip(NAMES, coefficients.tolist(), published.get(angle, ()), strict=False):
             if other and angle != 90:
-                rows.append(Row(case, f"{name} coefficient", value, other, None, source))
+                rows.append(Row(case, f"{name} coefficient", value, other, allowed, source))
     return rows
 
 
