@@ -66,7 +66,7 @@ def converging(short: bool) -> Findings:
     wide = [float(drags[1]) if side == middle else _last(_stream(100.0, 12, side, 8.0)) for side in windows]
     case = "sphere in a stream, Re 100"
     change = float(abs(drags[-1] / drags[1] - 1.0))
-    rows = [most(f"{case}, convergence", "change of drag from 12 to 20 cells", change, 0.02, "itself")]
+    rows = [most(f"{case}, convergence", "change of drag from 12 to 20 cells", change, 0.01, "itself")]
     for side, drag in zip(windows, wide, strict=True):
         size = " × ".join(f"{length:g}" for length in side)
         rows.append(Row(f"{case}, window {size}", "drag coefficient", drag, law(100.0), None, CLIFT))

@@ -1,8 +1,8 @@
 """Thin wings at large angles, and bodies so long that their middle feels a flow in the plane.
 
 The cells that a marker moves make a plate act as if it were some 1.5 cells thick in a steady shear. So the
-force along a plate is too large with few cells: held to the measurement is the normal force; lift and drag are
-reported beside it, with how they converge, and held to a computation once there are cells enough.
+force along a plate is too large with few cells: held to the measurement is the normal force; lift and drag
+are reported beside it, with how they converge, and held to a computation once there are cells enough.
 """
 
 from __future__ import annotations
