@@ -1,23 +1,10 @@
 #include "lw_lattice3.h"
 
-#if defined(__SSE__)
-#include <xmmintrin.h>
-#endif
-
 enum {
     ROWS = 16,  /* in one part of the job */
     LANES = 16, /* rows are worked on from and up to multiples of it: no remainders, aligned writes */
     AHEAD = 96  /* cells from those in work to those that memory is asked for */
 };
-
-/* What is read and what is written for a row do not overlap; the compiler cannot check it for 38 pointers. */
-#if defined(__clang__)
-#define LW_INDEPENDENT _Pragma("clang loop vectorize(assume_safety)")
-#elif defined(__GNUC__)
-#define LW_INDEPENDENT _Pragma("GCC ivdep")
-#else
-#define LW_INDEPENDENT
-#endif
 
 /* Populations of a cell by their direction; the diagonals of a plane by the signs along its two axes. */
 typedef struct { float pp, mm, pm, mp; } diagonals;
@@ -274,39 +261,12 @@ LW_INLINE void advance_rows(const step_job *step, int32_t part) {
     }
 }
 
-/* One version for each set of instructions. Without fast-math and contraction they give the same bits. */
-static void advance_plain(const step_job *step, int32_t part) { advance_rows(step, part); }
+LW_VERSIONS(advance, advance_rows, (const step_job *step, int32_t part), (step, part), step->lattice->instructions)
 
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(LW_ONE_VERSION)
-__attribute__((target("avx2"))) static void advance_avx2(const step_job *step, int32_t part) {
-    advance_rows(step, part);
-}
-__attribute__((target("avx512f"))) static void advance_avx512(const step_job *step, int32_t part) {
-    advance_rows(step, part);
-}
-
-static void advance(const step_job *step, int32_t part) {
-    switch (step->lattice->instructions) {
-    case LW_AVX512: advance_avx512(step, part); return;
-    case LW_AVX2: advance_avx2(step, part); return;
-    default: advance_plain(step, part);
-    }
-}
-#else
-static void advance(const step_job *step, int32_t part) { advance_plain(step, part); }
-#endif
-
-/* Ahead of the first waves in a fluid at rest numbers are too small for a float: handled in full they make
- * a step several times as slow. */
 static void advance_part(const void *job, int32_t part) {
-#if defined(__SSE__)
-    const unsigned mode = _mm_getcsr(), flush_to_zero = 0x8000, denormals_are_zero = 0x0040;
-    _mm_setcsr(mode | flush_to_zero | denormals_are_zero);
+    const unsigned mode = lw_flush_small();
     advance(job, part);
-    _mm_setcsr(mode);
-#else
-    advance(job, part);
-#endif
+    lw_restore_small(mode);
 }
 
 /* In the same memory, a row is written two slabs and three rows from its place, on that side from which the rows

@@ -193,25 +193,9 @@ LW_INLINE void do_any(const part_job *job, int32_t part) {
     }
 }
 
-static void part_plain(const part_job *job, int32_t part) { do_any(job, part); }
+LW_VERSIONS(do_one, do_any, (const part_job *job, int32_t part), (job, part), job->lattice->instructions)
 
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(LW_ONE_VERSION)
-__attribute__((target("avx2"))) static void part_avx2(const part_job *job, int32_t part) { do_any(job, part); }
-__attribute__((target("avx512f"))) static void part_avx512(const part_job *job, int32_t part) {
-    do_any(job, part);
-}
-
-static void do_part(const void *any, int32_t part) {
-    const part_job *job = any;
-    switch (job->lattice->instructions) {
-    case LW_AVX512: part_avx512(job, part); return;
-    case LW_AVX2: part_avx2(job, part); return;
-    default: part_plain(job, part);
-    }
-}
-#else
-static void do_part(const void *any, int32_t part) { part_plain(any, part); }
-#endif
+static void do_part(const void *job, int32_t part) { do_one(job, part); }
 
 int lw_mobility3(lw_boundary3 *b, const lw_lattice3 *l, int32_t *marker) {
     part_job job = {b, l, 0};

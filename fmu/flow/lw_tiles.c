@@ -125,51 +125,34 @@ LW_INLINE void products(const lw_tiles *t, int32_t width, const double *x, doubl
         }
 }
 
-/* ---- one version for each set of instructions: without fast-math and contraction the same bits ---- */
+/* ---- one version for each set of instructions ---- */
 
 typedef enum { FACTORISE, FORWARD, BACKWARD, PRODUCTS } task;
 
 typedef struct {
     task task;
     double least;
+    int32_t *failed;
     int32_t width;
     double *x, *products;
 } work;
 
-LW_INLINE int32_t do_any(const lw_tiles *t, const work *w) {
+LW_INLINE void do_any(const lw_tiles *t, const work *w) {
     switch (w->task) {
-    case FACTORISE: return factorise(t, w->least);
+    case FACTORISE: *w->failed = factorise(t, w->least); break;
     case FORWARD: forward(t, w->width, w->x); break;
     case BACKWARD: backward(t, w->width, w->x); break;
     case PRODUCTS: products(t, w->width, w->x, w->products); break;
     }
-    return -1;
 }
 
-static int32_t do_plain(const lw_tiles *t, const work *w) { return do_any(t, w); }
-
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(LW_ONE_VERSION)
-__attribute__((target("avx2"))) static int32_t do_avx2(const lw_tiles *t, const work *w) {
-    return do_any(t, w);
-}
-__attribute__((target("avx512f"))) static int32_t do_avx512(const lw_tiles *t, const work *w) {
-    return do_any(t, w);
-}
-
-static int32_t perform(const lw_tiles *t, const work *w) {
-    switch (t->instructions) {
-    case LW_AVX512: return do_avx512(t, w);
-    case LW_AVX2: return do_avx2(t, w);
-    default: return do_plain(t, w);
-    }
-}
-#else
-static int32_t perform(const lw_tiles *t, const work *w) { return do_plain(t, w); }
-#endif
+LW_VERSIONS(perform, do_any, (const lw_tiles *t, const work *w), (t, w), t->instructions)
 
 int32_t lw_tiles_factorise(const lw_tiles *t, double least) {
-    const work w = {.task = FACTORISE, .least = least};
-    return perform(t, &w);
+    int32_t failed;
+    const work w = {.task = FACTORISE, .least = least, .failed = &failed};
+    perform(t, &w);
+    return failed;
 }
 
 void lw_tiles_forward(const lw_tiles *t, int32_t width, double *x) {

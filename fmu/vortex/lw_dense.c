@@ -9,7 +9,8 @@
 
 enum { BLOCK = 32, AT_ONCE = 8, TILE = 256 }; /* columns; rows that are taken away at once; numbers of a row */
 
-typedef struct { double *a; int m, begin, end; } block; /* columns [begin, end) are eliminated */
+/* Columns [begin, end) are eliminated. */
+typedef struct { double *a; int m, begin, end; lw_instructions instructions; } block;
 
 static double *row_of(const block *b, int i) { return b->a + (size_t)i * b->m; }
 
@@ -43,25 +44,7 @@ LW_INLINE void rest_of(const block *b) {
     }
 }
 
-static void rest_plain(const block *b) { rest_of(b); }
-
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(LW_ONE_VERSION)
-__attribute__((target("avx2"))) static void rest_avx2(const block *b) { rest_of(b); }
-__attribute__((target("avx512f"))) static void rest_avx512(const block *b) { rest_of(b); }
-
-static void rest(const block *b, lw_instructions instructions) {
-    switch (instructions) {
-    case LW_AVX512: rest_avx512(b); return;
-    case LW_AVX2: rest_avx2(b); return;
-    default: rest_plain(b);
-    }
-}
-#else
-static void rest(const block *b, lw_instructions instructions) {
-    (void)instructions;
-    rest_plain(b);
-}
-#endif
+LW_VERSIONS(rest, rest_of, (const block *b), (b), b->instructions)
 
 static void exchange(const block *b, int i, int k) {
     double *one = row_of(b, i), *other = row_of(b, k);
@@ -92,9 +75,9 @@ static int columns(const block *b, double *pivots) {
 
 int lw_factor_dense(int m, double *a, double *pivots, lw_instructions instructions) {
     for (int begin = 0; begin < m; begin += BLOCK) {
-        const block b = {a, m, begin, begin + BLOCK < m ? begin + BLOCK : m};
+        const block b = {a, m, begin, begin + BLOCK < m ? begin + BLOCK : m, instructions};
         if (columns(&b, pivots)) return 1;
-        rest(&b, instructions);
+        rest(&b);
     }
     return 0;
 }

@@ -48,28 +48,9 @@ LW_INLINE void add_groups(const add_job *job, int32_t part) {
     for (int32_t first = begin; first < end; first += LW_LANES) add_group(job, first);
 }
 
-static void add_plain(const add_job *job, int32_t part) { add_groups(job, part); }
+LW_VERSIONS(add, add_groups, (const add_job *job, int32_t part), (job, part), job->points->instructions)
 
-/* Without fast-math and contraction every version gives the same bits. */
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(LW_ONE_VERSION)
-__attribute__((target("avx2"))) static void add_avx2(const add_job *job, int32_t part) {
-    add_groups(job, part);
-}
-__attribute__((target("avx512f"))) static void add_avx512(const add_job *job, int32_t part) {
-    add_groups(job, part);
-}
-
-static void add_part(const void *any, int32_t part) {
-    const add_job *job = any;
-    switch (job->points->instructions) {
-    case LW_AVX512: add_avx512(job, part); return;
-    case LW_AVX2: add_avx2(job, part); return;
-    default: add_plain(job, part);
-    }
-}
-#else
-static void add_part(const void *any, int32_t part) { add_plain(any, part); }
-#endif
+static void add_part(const void *job, int32_t part) { add(job, part); }
 
 void lw_filaments_add(const lw_filament *filaments, int32_t count, const lw_points *points) {
     const add_job job = {filaments, points, count};
