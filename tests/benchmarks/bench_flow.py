@@ -25,7 +25,8 @@ from typing import Any
 
 import numpy as np
 
-from linkwind.native.lattice import Lattice, shear_rate
+from linkwind.native.fluid import shear_rate
+from linkwind.native.lattice import Lattice
 from tests.benchmarks import openfoam_case
 from tests.fmu.c_model import build_hook
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from linkwind.native.lattice import shear_rate
+from linkwind.native.fluid import shear_rate
 from linkwind.native.lattice3 import DIRECTIONS, Lattice3
 from tests.benchmarks.bench_flow import Row, copies, paired, rounds
 

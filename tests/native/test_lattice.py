@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from linkwind.native.lattice import Lattice, shear_rate
+from linkwind.native.fluid import shear_rate
+from linkwind.native.lattice import Lattice
 from tests.native.flows import (
     CX,
     CY,

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from linkwind.native.lattice import Lattice, shear_rate
+from linkwind.native.fluid import shear_rate
+from linkwind.native.lattice import Lattice
 from linkwind.native.lattice3 import Lattice3
 from tests.native import flows
 from tests.native.flows3 import (

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from linkwind.native import lattice3 as module
-from linkwind.native.lattice import shear_rate
+from linkwind.native.fluid import shear_rate
 from linkwind.native.lattice3 import Lattice3
 from tests.native.builds import BUILDS, compiled, use
 from tests.native.flows3 import C, smooth_noise

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from linkwind.native import lattice as module
-from linkwind.native.lattice import Lattice, shear_rate
+from linkwind.native.fluid import shear_rate
+from linkwind.native.lattice import Lattice
 from tests.native.builds import BUILDS, compiled, use
 from tests.native.flows import CX, CY, smooth_noise, taylor_green
 

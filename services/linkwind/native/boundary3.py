@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from linkwind.native.boundary import Indices, Placement
-from linkwind.native.lattice import aligned
+from linkwind.native.fluid import aligned
 from linkwind.native.lattice3 import Lattice3
 from linkwind.native.library import declare
 from linkwind.spatial import Array, address

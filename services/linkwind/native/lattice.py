@@ -7,19 +7,15 @@ Equations and sources: ``fmu/README.md``, "Flow on a lattice".
 from __future__ import annotations
 
 import ctypes
-import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from linkwind.native.fluid import Floats, Fluid, address, aligned
 from linkwind.native.library import declare
 from linkwind.native.threads import team
 
-Floats = NDArray[np.float32]
-
 DIRECTIONS = 9
-MAX_SPEED = 0.3  # cells/step: faster, and the error of the method, of third order in it, is no longer small
 _PADDING = 112  # floats behind each plane: without it all planes of 512 x 448 would share the same cache sets
 _APART = 3  # rows between the places that populations have by turns, in the memory of a single thread
 
@@ -52,12 +48,7 @@ class Picture:
     vorticity: Floats
 
 
-def shear_rate(viscosity: float) -> float:
-    """Return the relaxation rate ω = 1/(3ν + ½) of a kinematic viscosity ν [cells²/step]."""
-    return 1.0 / (3.0 * viscosity + 0.5)
-
-
-class Lattice:
+class Lattice(Fluid):
     """A window full of fluid, surrounded by an undisturbed stream.
 
     Attributes:
@@ -84,7 +75,7 @@ class Lattice:
         Args:
             nx: cells along x; steps are fastest where it is a multiple of 16.
             ny: cells along y.
-            shear_rate: ω between 0 and 2, see ``shear_rate()``.
+            shear_rate: ω between 0 and 2, see ``linkwind.native.fluid.shear_rate()``.
             stream: velocity of the undisturbed fluid [cells/step], at most 0.3.
             fringe: layers on every side that relax towards the stream, layer k by 0.3 (1 − k/fringe)³ a step.
             threads: that share a step.
@@ -117,42 +108,6 @@ class Lattice:
         self._moments = declare("lw_lattice_moments", [pointer, number, pointer, pointer], None)
         self._halve_step = declare("lw_lattice_halve_step", [pointer, ctypes.c_float])
         declare("lw_lattice_init", [pointer], None)(self.struct_address)
-
-    @property
-    def populations(self) -> Floats:
-        """Populations after the last collision, less the weights of their directions.
-
-        Shape (9, ny, nx), a view of where they are now: a step puts them elsewhere and may write over it.
-        """
-        first, second = self._places
-        return first if self._struct.populations == address(first) else second
-
-    @property
-    def shear_rate(self) -> float:
-        """Relaxation rate ω of the shear stress; may be set at any time."""
-        return float(self._struct.shear_rate)
-
-    @shear_rate.setter
-    def shear_rate(self, value: float) -> None:
-        if not 0.0 < np.float32(value) < 2.0:
-            raise ValueError(
-                f"shear_rate: expected a rate between 0 and 2 in single precision; got {value!r}. "
-                "It is 1/(3 viscosity + 1/2): use a positive viscosity, above 1e-7 cells² a step."
-            )
-        self._struct.shear_rate = value
-
-    @property
-    def stream(self) -> tuple[float, float]:
-        """Velocity of the undisturbed fluid [cells/step]; may be set at any time."""
-        return self._struct.stream[0], self._struct.stream[1]
-
-    @stream.setter
-    def stream(self, value: tuple[float, float]) -> None:
-        if not math.hypot(*value) <= MAX_SPEED:
-            raise ValueError(
-                f"stream: expected at most {MAX_SPEED} cells/step; got {value}. Shorten the step."
-            )
-        self._struct.stream[:] = value
 
     @property
     def force_rows(self) -> tuple[int, int]:
@@ -197,41 +152,6 @@ class Lattice:
         vorticity = np.gradient(velocity[1], stride, axis=1) - np.gradient(velocity[0], stride, axis=0)
         return Picture(velocity, density, vorticity)
 
-    def halve_step(self, shear_rate: float) -> None:
-        """Halve the time of a step; the cells and the physical fields stay as they are.
-
-        Velocities, ``stream`` included, become half, the density's difference from 1 a fourth, and the second
-        moments such that the physical stress stays. Where a force acted in the last step, half of it is in
-        the velocity and is treated like the rest.
-
-        Args:
-            shear_rate: the new ω, 4ω/(2 + ω) where the physical viscosity stays.
-
-        Raises:
-            ValueError: the new rate is out of its range, or the old one is 1, which leaves no stress to keep.
-        """
-        old = self.shear_rate
-        self.shear_rate = shear_rate  # checks it
-        new, self._struct.shear_rate = self.shear_rate, old
-        if self._halve_step(self.struct_address, new):
-            raise ValueError("halve_step: expected a shear_rate other than 1 before; got 1. Use 0.999.")
-
-    @property
-    def state(self) -> bytes:
-        """The whole state between two steps: ω, stream and populations; ``force`` is not part of it.
-
-        Setting it raises ValueError where the bytes are not of a lattice of this size.
-        """
-        return np.array([self.shear_rate, *self.stream], np.float32).tobytes() + self.populations.tobytes()
-
-    @state.setter
-    def state(self, value: bytes) -> None:
-        if len(value) != 12 + self.populations.nbytes:
-            raise ValueError(f"state: expected {12 + self.populations.nbytes} bytes; got {len(value)}")
-        numbers = np.frombuffer(value, dtype=np.float32)
-        self.shear_rate, self.stream = float(numbers[0]), (float(numbers[1]), float(numbers[2]))
-        self.populations[:] = numbers[3:].reshape(DIRECTIONS, self.ny, self.nx)
-
 
 def _check_size(nx: int, ny: int, fringe: int) -> None:
     if fringe < 1:
@@ -239,15 +159,3 @@ def _check_size(nx: int, ny: int, fringe: int) -> None:
     for name, size in (("nx", nx), ("ny", ny)):
         if size < 2 * fringe + 8:
             raise ValueError(f"{name}: expected at least 2 fringe + 8 = {2 * fringe + 8} cells; got {size}")
-
-
-def aligned(count: int) -> Floats:
-    """Return zeros at the start of a cache line."""
-    memory = np.zeros(count + 16, dtype=np.float32)
-    start = -address(memory) % 64 // 4
-    return memory[start : start + count]
-
-
-def address(array: Floats | NDArray[np.uint8]) -> int:
-    """Return where an array begins in memory."""
-    return int(array.__array_interface__["data"][0])

@@ -7,13 +7,12 @@ Equations and sources: ``fmu/README.md``, "Flow in space".
 from __future__ import annotations
 
 import ctypes
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from linkwind.native.lattice import MAX_SPEED, Floats, address, aligned
+from linkwind.native.fluid import Floats, Fluid, address, aligned
 from linkwind.native.library import declare
 from linkwind.native.threads import team
 
@@ -49,7 +48,7 @@ class Picture3:
     density: Floats
 
 
-class Lattice3:
+class Lattice3(Fluid):
     """A window full of fluid in space, surrounded by an undisturbed stream.
 
     Attributes:
@@ -80,7 +79,7 @@ class Lattice3:
             nx: cells along x; steps are fastest where it is a multiple of 16.
             ny: cells along y.
             nz: cells along z.
-            shear_rate: ω between 0 and 2, see ``linkwind.native.lattice.shear_rate()``.
+            shear_rate: ω between 0 and 2, see ``linkwind.native.fluid.shear_rate()``.
             stream: velocity of the undisturbed fluid [cells/step], at most 0.3.
             fringe: layers on every side that relax towards the stream, layer k by 0.3 (1 − k/fringe)³ a step.
             threads: that share a step.
@@ -118,44 +117,6 @@ class Lattice3:
         self._halve_step = declare("lw_lattice3_halve_step", [pointer, ctypes.c_float])
         declare("lw_lattice3_init", [pointer], None)(self.struct_address)
 
-    @property
-    def populations(self) -> Floats:
-        """Populations after the last collision, less the weights of their directions.
-
-        Shape (19, nz, ny, nx), a view of where they are now: a step puts them elsewhere and may write over
-        it. The order of the directions is that of ``lw_lattice3.h``.
-        """
-        first, second = self._places
-        return first if self._struct.populations == address(first) else second
-
-    @property
-    def shear_rate(self) -> float:
-        """Relaxation rate ω of the shear stress; may be set at any time."""
-        return float(self._struct.shear_rate)
-
-    @shear_rate.setter
-    def shear_rate(self, value: float) -> None:
-        if not 0.0 < np.float32(value) < 2.0:
-            raise ValueError(
-                f"shear_rate: expected a rate between 0 and 2 in single precision; got {value!r}. "
-                "It is 1/(3 viscosity + 1/2): use a positive viscosity, above 1e-7 cells² a step."
-            )
-        self._struct.shear_rate = value
-
-    @property
-    def stream(self) -> Vector:
-        """Velocity of the undisturbed fluid [cells/step]; may be set at any time."""
-        x, y, z = self._struct.stream
-        return x, y, z
-
-    @stream.setter
-    def stream(self, value: Vector) -> None:
-        if not math.hypot(*value) <= MAX_SPEED:
-            raise ValueError(
-                f"stream: expected at most {MAX_SPEED} cells/step; got {value}. Shorten the step."
-            )
-        self._struct.stream[:] = value
-
     def step(self, shift: tuple[int, int, int] = (0, 0, 0)) -> None:
         """Go on by one step.
 
@@ -187,42 +148,6 @@ class Lattice3:
         velocity, density = np.empty((3, *shape), dtype=np.float32), np.empty(shape, dtype=np.float32)
         self._moments(self.struct_address, stride, address(velocity), address(density))
         return Picture3(velocity, density)
-
-    def halve_step(self, shear_rate: float) -> None:
-        """Halve the time of a step; the cells and the physical fields stay as they are.
-
-        Velocities, ``stream`` included, become half, the density's difference from 1 a fourth, and the second
-        moments such that the physical stress stays. Where a force acted in the last step, half of it is in
-        the velocity and is treated like the rest.
-
-        Args:
-            shear_rate: the new ω, 4ω/(2 + ω) where the physical viscosity stays.
-
-        Raises:
-            ValueError: the new rate is out of its range, or the old one is 1, which leaves no stress to keep.
-        """
-        old = self.shear_rate
-        self.shear_rate = shear_rate  # checks it
-        new, self._struct.shear_rate = self.shear_rate, old
-        if self._halve_step(self.struct_address, new):
-            raise ValueError("halve_step: expected a shear_rate other than 1 before; got 1. Use 0.999.")
-
-    @property
-    def state(self) -> bytes:
-        """The whole state between two steps: ω, stream and populations; ``force`` is not part of it.
-
-        Setting it raises ValueError where the bytes are not of a lattice of this size.
-        """
-        return np.array([self.shear_rate, *self.stream], np.float32).tobytes() + self.populations.tobytes()
-
-    @state.setter
-    def state(self, value: bytes) -> None:
-        if len(value) != 16 + self.populations.nbytes:
-            raise ValueError(f"state: expected {16 + self.populations.nbytes} bytes; got {len(value)}")
-        numbers = np.frombuffer(value, dtype=np.float32)
-        rate, x, y, z = map(float, numbers[:4])
-        self.shear_rate, self.stream = rate, (x, y, z)
-        self.populations[:] = numbers[4:].reshape(self.populations.shape)
 
 
 def _check_size(nx: int, ny: int, nz: int, fringe: int) -> None:

@@ -17,31 +17,14 @@ from linkwind.aero.flow.surface import surface_markers
 from linkwind.frames import FlowFrame, VolumeFrame
 from linkwind.native.boundary import Boundary, Placement
 from linkwind.native.boundary3 import Boundary3
-from linkwind.native.lattice import Lattice, shear_rate
+from linkwind.native.fluid import shear_rate
+from linkwind.native.lattice import Lattice
 from linkwind.native.lattice3 import Lattice3
 from linkwind.scenario.bodies import Body, Joint
 from linkwind.spatial import Array, Motion
 
 PICTURE = 256  # cells of a picture in the plane along its longer side, about
 PICTURE3 = 250_000  # cells of one in space, at most
-
-
-class Fluid(Protocol):
-    """A lattice of either kind, as far as they are alike."""
-
-    stream: Any
-    shear_rate: float
-    state: bytes
-
-    @property
-    def populations(self) -> Any:
-        """Shape (directions, …, rows, columns)."""
-
-    def halve_step(self, shear_rate: float) -> None:
-        """Halve the time of a step."""
-
-    def moments(self, stride: int = 1) -> Any:
-        """Return means over blocks of cells."""
 
 
 class Walls(Protocol):
@@ -109,7 +92,7 @@ class Geometry:
     width: int
     state: Callable[[Motion, Array | slice], State]
     between: Callable[[State, State, float, float], State]
-    lattice: Callable[[Grid, Sequence[int], int], Fluid]
+    lattice: Callable[[Grid, Sequence[int], int], Lattice | Lattice3]
     walls: Callable[[list[Body], list[Joint], State, Grid], Walls]
     inside: Callable[[list[Body], float], Inside]
     stride: Callable[[Sequence[int]], int]

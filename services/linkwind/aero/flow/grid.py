@@ -9,7 +9,7 @@ import numpy as np
 
 from linkwind.aero.base import body_indices, item
 from linkwind.errors import ScenarioError
-from linkwind.native.lattice import shear_rate
+from linkwind.native.fluid import shear_rate
 from linkwind.scenario import Provider, Scenario
 from linkwind.scenario.bodies import Body
 from linkwind.scenario.shapes import AnyShape, Circle, Ellipse, Ellipsoid, Rectangle, Wing, signed_area

@@ -12,7 +12,7 @@ from linkwind.aero.flow.grid import Grid
 from linkwind.errors import ProtocolError
 from linkwind.frames import FlowFrame, VolumeFrame
 from linkwind.native.boundary import Placement
-from linkwind.native.lattice import shear_rate
+from linkwind.native.fluid import shear_rate
 from linkwind.spatial import Array
 
 SLACK = 2.0  # cells by which the mechanism may leave its place before the window follows
