@@ -169,8 +169,8 @@ def test_a_revolving_blade_is_the_integral_over_its_span():
     rate = 3.0
     blade = Wing(type="wing", points=[[-0.1, 0.2], [0.2, 0.2], [0.25, 1.0], [0.15, 1.0]])
     motion = revolving(rate)
-    z = np.linspace(0.2, 1.0, 4001)
-    weight = np.ones(4001)
+    z = np.linspace(0.2, 1.0, 801)
+    weight = np.ones(801)
     weight[1:-1:2], weight[2:-1:2] = 4, 2
     weight *= (z[1] - z[0]) / 3
     front, back = -0.1 + (z - 0.2) * 0.25 / 0.8, 0.2 + (z - 0.2) * 0.05 / 0.8

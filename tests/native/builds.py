@@ -3,6 +3,8 @@
 import ctypes
 import subprocess
 import sys
+import tempfile
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -14,8 +16,9 @@ SETS = {"sse2": (), "avx2": ("-mavx2",), "avx512f": ("-mavx512f",)}
 BUILDS = [*SETS, "zig"]
 
 
-def compiled(name, folder):
-    """Compile for one set of instructions only, or with another compiler; return the library."""
+@cache
+def compiled(name):
+    """Compile for one set of instructions only, or with another compiler, once; return the library."""
     if name == "zig":
         pytest.importorskip("ziglang")
         command, extra = [sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline"], ()
@@ -23,20 +26,16 @@ def compiled(name, folder):
         if not CPU.exists() or name not in CPU.read_text():
             pytest.skip(f"this processor has no {name}")
         command, extra = build_hook().compiler(), ("-DLW_ONE_VERSION", *SETS[name])
-    hook, file = build_hook(), folder / "fluids.so"
+    hook = build_hook()
     folders = ("core", "aero", "flow", "vortex")
     sources = [*(C / "flow").glob("*.c"), *(C / "vortex").glob("*.c")]
     sources += [C / "core" / "lw_linear.c", C / "aero" / "lw_wind.c"]
     arguments = [*hook.FLAGS, *hook.WARNINGS, "-Werror", "-O3", "-pthread", "-shared", *extra]
-    arguments += [
-        *(f"-I{C / inner}" for inner in folders),
-        "-o",
-        str(file),
-        *map(str, sorted(sources)),
-        "-lm",
-    ]
-    subprocess.run([*command, *arguments], check=True)
-    return ctypes.CDLL(str(file))
+    arguments += [*(f"-I{C / inner}" for inner in folders), *map(str, sorted(sources)), "-lm"]
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "fluids.so"
+        subprocess.run([*command, *arguments, "-o", str(file)], check=True)
+        return ctypes.CDLL(str(file))
 
 
 def use(monkeypatch, module, library):

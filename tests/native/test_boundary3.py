@@ -316,9 +316,9 @@ def run(threads=1):
 
 
 @pytest.mark.parametrize("name", BUILDS)
-def test_bits_do_not_depend_on_instructions_and_compiler(name, tmp_path, monkeypatch):
+def test_bits_do_not_depend_on_instructions_and_compiler(name, monkeypatch):
     expected = run()
-    use(monkeypatch, module, compiled(name, tmp_path))
+    use(monkeypatch, module, compiled(name))
     assert run() == expected
 
 

@@ -27,9 +27,9 @@ def test_bits_do_not_depend_on_the_number_of_threads(threads):
 
 
 @pytest.mark.parametrize("name", BUILDS)
-def test_bits_do_not_depend_on_instructions_and_compiler(name, tmp_path, monkeypatch):
+def test_bits_do_not_depend_on_instructions_and_compiler(name, monkeypatch):
     expected = run()
-    use(monkeypatch, module, compiled(name, tmp_path))
+    use(monkeypatch, module, compiled(name))
     assert run() == expected
 
 
