@@ -24,7 +24,7 @@ def test_strips_have_the_area_and_the_centre_of_their_part(wing, count):
     cut = [part.reshape(count, -1) for part in (back - front, 0.5 * (front + back), slices)]
     length, x, z = cut
     expected = [length.mean(1), (length * x).mean(1) / length.mean(1), (length * z).mean(1) / length.mean(1)]
-    np.testing.assert_allclose(found, np.transpose(expected), rtol=0, atol=1e-4)
+    np.testing.assert_allclose(found, np.transpose(expected), rtol=0, atol=2e-5)
 
 
 def test_a_delta_has_its_centre_at_two_thirds():

@@ -28,8 +28,8 @@ def cells(size):
     return tuple(CELL * length for length in size)
 
 
-def alone(shape):
-    return surface_markers([body(shape)], [], AT_REST[None], CELL, VISCOSITY)
+def alone(shape, viscosity=VISCOSITY):
+    return surface_markers([body(shape)], [], AT_REST[None], CELL, viscosity)
 
 
 def nearest(points):
@@ -227,17 +227,19 @@ def test_a_cylinder_is_closed_at_its_ends(shape):
 
 @pytest.mark.parametrize("size", [(24, 24, 24), (24, 12, 8), (24, 24, 5), (5, 40, 6), (6, 5, 30)])
 def test_markers_of_an_ellipsoid_are_spread_evenly_and_drawn_in_along_its_normals(size):
-    markers, half = alone({"type": "ellipsoid", "size": cells(size)}), np.array(size) / 2
+    viscosity = 0.1  # drawn in by the least: by more than that, tips 5 cells thick would be all curvature
+    drawn, half = inset(CLOSED_INSET, viscosity), np.array(size) / 2
+    markers = alone({"type": "ellipsoid", "size": cells(size)}, viscosity)
     points = markers.point
     spread = nearest(points)
     assert spread.min() >= CLOSEST - 1e-9
     assert spread.max() < 1.2 * SPACING
-    assert np.abs(points).max(axis=0) == pytest.approx(half - CLOSED, abs=0.6)
+    assert np.abs(points).max(axis=0) == pytest.approx(half - drawn, abs=0.6)
     fine = _fibonacci(half, 20000)
     for point in points[:: max(1, len(points) // 50)]:
-        assert np.linalg.norm(fine - point, axis=1).min() == pytest.approx(CLOSED, abs=0.1)
-    area = _area(half - CLOSED)
-    assert len(points) == pytest.approx(area / SPACING**2, rel=0.15)
+        assert np.linalg.norm(fine - point, axis=1).min() == pytest.approx(drawn, abs=0.06)
+    area = _area(half - drawn)
+    assert len(points) == pytest.approx(area / SPACING**2, rel=0.12)
 
 
 def _fibonacci(half, count):
