@@ -82,6 +82,14 @@ def test_a_run_and_what_programs_do_with_its_log(tmp_path: Path) -> None:
     assert done.file.stat().st_size == done.bytes > 0
 
 
+def test_an_export_takes_what_load_takes(tmp_path: Path) -> None:
+    files = [
+        linkwind.export_fmu(scenario, tmp_path / f"{index}.fmu").file.read_bytes()
+        for index, scenario in enumerate(["two_link", linkwind.load("two_link")])
+    ]
+    assert files[0] == files[1]
+
+
 def test_a_table_has_the_columns_that_are_exported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scenario = linkwind.load("two_link", ["bus.transport=inprocess", "time.end=0.01"])
     log = linkwind.open_log(linkwind.run(scenario, tmp_path / "run", report=False).log)

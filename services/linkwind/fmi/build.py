@@ -6,6 +6,7 @@ import struct
 import tempfile
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
 
@@ -104,23 +105,38 @@ def _compile(sources: Mapping[str, bytes], name: str, command: list[str]) -> byt
         extra = windows.prepare(place) if name.endswith("windows") and "-target" in command else ["-lm"]
         inputs = sorted(file for file in sources if file.endswith(".c"))
         if "-target" not in command:  # zig keeps objects by itself, and is busy with other platforms
-            inputs = _objects(inputs, place, command)
+            inputs = _objects(sources, place, command)
         arguments = [*command, *flags(), HIDE, "-shared", "-s", "-o", "binary", *inputs, *extra]
         toolchain.run(arguments, place, f"the binary for {name}")
         return (place / "binary").read_bytes()
 
 
-def _objects(inputs: list[str], place: Path, command: list[str]) -> list[str]:
-    """Compile file groups side by side; return the objects."""
-    groups = [inputs[start::_AT_ONCE] for start in range(_AT_ONCE)]
+def _objects(sources: Mapping[str, bytes], place: Path, command: list[str]) -> list[str]:
+    """Compile files side by side, into the folder; return the objects."""
+    headers = tuple(item for item in sources.items() if item[0].endswith(".h"))
+    compiled = {
+        file: (tuple(command), file, content, headers)
+        for file, content in sorted(sources.items())
+        if file.endswith(".c")
+    }
     with ThreadPoolExecutor(_AT_ONCE) as pool:
-        list(
-            pool.map(
-                lambda group: toolchain.run([*command, *flags(), HIDE, "-c", *group], place, "the binary"),
-                groups,
-            )
-        )
-    return [file.removesuffix(".c") + ".o" for file in inputs]
+        objects = pool.map(lambda file: _object(*compiled[file]), compiled)
+        for file, content in zip(compiled, objects, strict=True):
+            (place / f"{file}.o").write_bytes(content)
+    return [f"{file}.o" for file in compiled]
+
+
+@lru_cache(maxsize=128)
+def _object(
+    command: tuple[str, ...], file: str, content: bytes, headers: tuple[tuple[str, bytes], ...]
+) -> bytes:
+    """Return a compiled file; the next FMU of this process with the same one need not compile it again."""
+    with tempfile.TemporaryDirectory(prefix="linkwind-") as folder:
+        place = Path(folder)
+        for name, text in ((file, content), *headers):
+            (place / name).write_bytes(text)
+        toolchain.run([*command, *flags(), HIDE, "-c", "-o", "object", file], place, "the binary")
+        return (place / "object").read_bytes()
 
 
 def universal(x86_64: bytes, arm64: bytes) -> bytes:

@@ -19,7 +19,7 @@ from linkwind.fmi import build, data, documentation, picture, terminals, toolcha
 from linkwind.fmi.description import FmiVersion, model_description, to_bytes
 from linkwind.fmi.part import Part, PartName, aero_part, dynamics_part
 from linkwind.fmi.reference import reference_files
-from linkwind.scenario import Scenario
+from linkwind.scenario import Scenario, load
 
 Arrays = Literal["native", "scalar"]
 
@@ -45,7 +45,7 @@ class Exported:
 
 
 def export(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     out: str | Path,
     *,
     fmi: FmiVersion = "2",
@@ -56,7 +56,7 @@ def export(
     """Write an FMU for Co-Simulation and Model Exchange.
 
     Args:
-        scenario: whose mechanism or force model it is.
+        scenario: whose mechanism or force model it is, or what :func:`linkwind.load` takes.
         out: the file.
         fmi: version of FMI.
         platforms: ``host``, ``all``, or names of FMI 3 such as ``x86_64-windows``. The binary of ``host``
@@ -70,7 +70,8 @@ def export(
             scenario without such a part.
     """
     names = toolchain.choose(platforms)
-    fmu = archive(_part(scenario, fmi, part, arrays), fmi, platforms)
+    loaded = scenario if isinstance(scenario, Scenario) else load(scenario)
+    fmu = archive(_part(loaded, fmi, part, arrays), fmi, platforms)
     file = Path(out)
     write(file, fmu)
     return Exported(file, len(fmu), fmi, tuple(names))
