@@ -42,7 +42,7 @@ class Whole:
 
     def __init__(self, folder: Path) -> None:
         settings = [f"time.end={STEPS / 1000}", "bus.transport=inprocess", "log.checkpoint_every=20"]
-        self.path = run(load("two_link_field", settings), folder / "run", lambda step: None).log
+        self.path = run(load("two_link_field", settings), folder / "run", lambda step: None, report=False).log
         self.data = self.path.read_bytes()
         log = open_log(self.path)
         self.digest = log.final_state_sha256

@@ -23,7 +23,7 @@ STEPS = 30
 
 def fly(folder: Path, *settings: str, name: str = "two_link") -> Path:
     short = [f"time.end={STEPS / 1000}", "bus.transport=inprocess"]
-    return run(load(name, [*short, *settings]), folder, lambda step: None).log
+    return run(load(name, [*short, *settings]), folder, lambda step: None, report=False).log
 
 
 @pytest.fixture(scope="module")

@@ -491,7 +491,7 @@ def test_a_run_that_goes_on_is_heard_from_its_beginning(name: str, tmp_path: Pat
     settings += ["time.end=0.06"] if name == "two_link" else [
         "time.end=4e-3", "aero.flow.cells=16", "aero.flow.frames=8",
     ]  # fmt: skip
-    whole = run(load(name, settings), tmp_path / "whole" / "out", lambda step: None)
+    whole = run(load(name, settings), tmp_path / "whole" / "out", lambda step: None, report=False)
     (tmp_path / "out").mkdir()
     cut(whole.log, tmp_path / "out" / "log.mcap", sum(open_log(whole.log).topics.values()) // 2)
     endpoint = loopback_endpoint()

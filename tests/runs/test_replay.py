@@ -37,7 +37,9 @@ NOTHING: dict[str, Any] = {"topics": [], "description": b"", "playback": lambda 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     settings = [f"time.end={STEPS / 1000}", "bus.transport=inprocess"]
-    return run(load("two_link", settings), tmp_path_factory.mktemp("run") / "out", lambda step: None).log
+    return run(
+        load("two_link", settings), tmp_path_factory.mktemp("run") / "out", lambda step: None, report=False
+    ).log
 
 
 def recorded(log: Path, *topics: str) -> list[tuple[str, bytes]]:
@@ -125,7 +127,7 @@ def test_separate_subscribers_get_their_topics_in_order(log: Path) -> None:
 def test_many_messages_as_fast_as_possible(tmp_path: Path) -> None:
     """More than all queues on the way can hold, to a subscriber that takes its time."""
     settings = ["time.end=5", "bus.transport=inprocess"]
-    long = run(load("two_link", settings), tmp_path / "out", lambda step: None).log
+    long = run(load("two_link", settings), tmp_path / "out", lambda step: None, report=False).log
     endpoint, expected = loopback_endpoint(), recorded(long)
     with closing(Subscriber(endpoint, "linkwind/v1/out/**", enough=len(expected))) as subscriber:
         keep = subscriber.got.append

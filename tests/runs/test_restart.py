@@ -67,7 +67,7 @@ def scenario() -> Scenario:
 @pytest.fixture
 def whole(tmp_path: Path) -> Outcome:
     settings = [*SETTINGS, "bus.transport=inprocess"]
-    return run(load("two_link_field", settings), tmp_path / "whole" / "out", lambda step: None)
+    return run(load("two_link_field", settings), tmp_path / "whole" / "out", lambda step: None, report=False)
 
 
 def left(whole: Outcome, folder: Path, count: int) -> Path:

@@ -31,11 +31,13 @@ FAST = ("two_link", "two_link_free", "two_link_field", "two_link_gust")
 
 def fly(name: str, folder: Path, *settings: str) -> Outcome:
     usual = [f"time.end={STEPS / 1000}", "bus.transport=inprocess", f"log.checkpoint_every={EVERY}"]
-    return run(load(name, [*usual, *settings]), folder, lambda step: None)
+    return run(load(name, [*usual, *settings]), folder, lambda step: None, report=False)
 
 
-def go_on(log: Path, folder: Path, step: int | None = None, settings: Sequence[str] = ()) -> Resumed:
-    return resume(plan(open_log(log), step, settings), folder)
+def go_on(
+    log: Path, folder: Path, step: int | None = None, settings: Sequence[str] = (), *, report: bool = False
+) -> Resumed:
+    return resume(plan(open_log(log), step, settings), folder, report=report)
 
 
 def cut(log: Path, target: Path, messages: int) -> Path:
@@ -304,7 +306,7 @@ def test_a_later_end(tmp_path: Path) -> None:
 
 def test_the_new_log_says_where_it_comes_from(tmp_path: Path) -> None:
     whole = fly("two_link", tmp_path / "whole")
-    log = open_log(go_on(whole.log, tmp_path / "again", 25, [GRAVITY]).outcome.log)
+    log = open_log(go_on(whole.log, tmp_path / "again", 25, [GRAVITY], report=True).outcome.log)
     assert log.run == "whole"
     assert (log.metadata["resumed_run"], log.metadata["resumed_step"]) == ("whole", "25")
     assert list(log.changes) == [25]

@@ -27,7 +27,7 @@ STEPS = 30
 def fly(name: str, folder: Path, *settings: str) -> Path:
     end_ns = STEPS * load(name).coupling.step_ns
     changes = [f"time.end={end_ns / 1e9!r}", *COARSE.get(name, ()), *settings]
-    return run(load(name, changes), folder, lambda step: None).log
+    return run(load(name, changes), folder, lambda step: None, report=False).log
 
 
 def check(log: Path, **options: bool) -> Verified:
@@ -198,7 +198,7 @@ def test_a_wrench_of_another_step_is_found(log: Path, tmp_path: Path) -> None:
 def test_a_run_that_failed_fails_again_at_the_same_place(transport: str, tmp_path: Path) -> None:
     settings = ["aero.field.link1.fx='1/(t-0.02)**2'", f"bus.transport={transport}", "time.end=0.04"]
     with pytest.raises(FaultError):
-        run(load("two_link_field", settings), tmp_path / "out", lambda step: None)
+        run(load("two_link_field", settings), tmp_path / "out", lambda step: None, report=False)
     found = check(tmp_path / "out" / "log.mcap")
     assert found.identical
     assert found.steps == 19
@@ -237,7 +237,9 @@ fy = "sin(t)"
 def test_several_providers(transport: str, tmp_path: Path) -> None:
     scenario = tmp_path / "two.toml"
     scenario.write_text(TWO_PROVIDERS)
-    path = run(load(scenario, [f"bus.transport={transport}"]), tmp_path / "out", lambda step: None).log
+    path = run(
+        load(scenario, [f"bus.transport={transport}"]), tmp_path / "out", lambda step: None, report=False
+    ).log
     for recorded in (False, True):
         found = check(path, from_recorded_wrenches=recorded)
         assert (found.difference, found.steps) == (None, 20)

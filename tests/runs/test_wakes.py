@@ -39,7 +39,12 @@ TOPIC, SCENE = "/wake/aero", "/scene/wake/aero"
 
 
 def fly(folder: Path, *more: str) -> Outcome:
-    return run(load("flapper", ["bus.transport=inprocess", *SETTINGS, *more]), folder, lambda step: None)
+    return run(
+        load("flapper", ["bus.transport=inprocess", *SETTINGS, *more]),
+        folder,
+        lambda step: None,
+        report=False,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +104,7 @@ def test_a_run_with_wakes_is_the_same_again(log: Path) -> None:
 @pytest.mark.parametrize("step", [7, 8, 16, 21, 26])
 def test_a_run_that_goes_on_shows_the_same(log: Path, tmp_path: Path, step: int, transport: str) -> None:
     """From checkpoints at 7, 14, 21 and 28; frames are due at 8, 16 and 24."""
-    done = resume(plan(open_log(log), step, [f"bus.transport={transport}"]), tmp_path / "again")
+    done = resume(plan(open_log(log), step, [f"bus.transport={transport}"]), tmp_path / "again", report=False)
     strip = {"/scene", "/tf"}
     assert [m for m in messages(done.outcome.log) if m[0] not in strip] == [
         m for m in messages(log) if m[0] not in strip
@@ -110,12 +115,12 @@ def test_a_run_that_goes_on_shows_the_same(log: Path, tmp_path: Path, step: int,
 def test_a_frame_that_is_due_at_a_checkpoint_is_not_lost(tmp_path: Path) -> None:
     whole = fly(tmp_path / "whole", "log.checkpoint_every=8")
     for step in (8, 16, 20):
-        done = resume(plan(open_log(whole.log), step, []), tmp_path / str(step))
+        done = resume(plan(open_log(whole.log), step, []), tmp_path / str(step), report=False)
         assert messages(done.outcome.log) == messages(whole.log)
 
 
 def test_how_many_frames_there_are_may_change(log: Path, tmp_path: Path) -> None:
-    done = resume(plan(open_log(log), 14, ["aero.vortex.frames=30"]), tmp_path / "more")
+    done = resume(plan(open_log(log), 14, ["aero.vortex.frames=30"]), tmp_path / "more", report=False)
     assert [f.step for f in open_log(done.outcome.log).wake_frames("aero")] == [0, 8, *range(15, 31)]
     state = open_log(log).final_state_sha256
     assert done.outcome.result.final_state_sha256 == state
