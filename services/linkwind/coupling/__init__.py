@@ -16,7 +16,8 @@ function ``run`` like those two, one entry here.
 from __future__ import annotations
 
 from linkwind.coupling import explicit, implicit, pec
-from linkwind.coupling.base import Answer, CommunicationPoint, Exchange, Met, Plant, Scheme, Settings, State
+from linkwind.coupling.answer import Answer
+from linkwind.coupling.base import CommunicationPoint, Exchange, Met, Plant, Scheme, Settings, State
 from linkwind.coupling.degree import DegreeControl
 from linkwind.coupling.history import History
 

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from linkwind.coupling.base import Array
+from linkwind.coupling.answer import Array
 
 FIRST = 0.5  # relaxation of the very first iteration
 KEPT = 5  # steps whose columns IQN-ILS reuses

@@ -10,32 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from linkwind.coupling.degree import DegreeControl
-    from linkwind.coupling.history import History
+from linkwind.coupling.answer import Answer, Array
+from linkwind.coupling.degree import DegreeControl
+from linkwind.coupling.history import History
 
-Array = NDArray[np.float64]
 State = Any  # the plant's own; a scheme stores it and hands it back, never looks inside, never changes it
-
-
-class Answer(NamedTuple):
-    """What the fluid does to the bodies at one communication point, all providers together.
-
-    Attributes:
-        wrench: shape (n, 6), without the part that is proportional to acceleration. Copied by the scheme.
-        added_inertia: ``A``, shape (n, 6, 6), for a further wrench −A·a; None for none. Copied as well.
-        response: ``G``, shape (6n, 6n): the wrench is less by G (twist − trial twist) for another twist at
-            the end of the step; None where that is not known. Copied as well.
-    """
-
-    wrench: Array
-    added_inertia: Array | None = None
-    response: Array | None = None
 
 
 class Met(NamedTuple):

@@ -26,7 +26,7 @@ from math import isnan, nan
 
 import numpy as np
 
-from linkwind.coupling.base import Array
+from linkwind.coupling.answer import Array
 
 MEMORY = 0.5  # β
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from linkwind.coupling.base import Answer, Array
+from linkwind.coupling.answer import Answer, Array
 from linkwind.errors import SimulationError
 
 SYMMETRY = 1e-9  # largest relative asymmetry, and negative eigenvalue, of an added inertia

@@ -20,7 +20,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from linkwind.coupling.acceleration import ACCELERATIONS, Acceleration
-from linkwind.coupling.base import Array, CommunicationPoint, Exchange, Met, Plant, Settings, State
+from linkwind.coupling.answer import Array
+from linkwind.coupling.base import CommunicationPoint, Exchange, Met, Plant, Settings, State
 from linkwind.coupling.degree import DegreeControl
 from linkwind.coupling.history import History
 from linkwind.coupling.response import EXPLICIT, correct, stiffness, through

@@ -18,7 +18,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from linkwind.coupling.base import Array, CommunicationPoint, Exchange, Plant, Settings, State
+from linkwind.coupling.answer import Array
+from linkwind.coupling.base import CommunicationPoint, Exchange, Plant, Settings, State
 from linkwind.coupling.history import History
 from linkwind.coupling.response import EXPLICIT, correct, predict, stiffness
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from linkwind.coupling.base import Array, Met, Plant, State
+from linkwind.coupling.answer import Array
+from linkwind.coupling.base import Met, Plant, State
 from linkwind.coupling.history import History
 
 EXPLICIT = 0.25  # stiffness up to which a prediction needs no response
