@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
 from linkwind.aero.base import Capabilities, ForceModel, item
@@ -20,6 +21,7 @@ from linkwind.aero.flow import Flow
 from linkwind.aero.none import Vacuum
 from linkwind.aero.plate import Plate
 from linkwind.aero.python import PythonForces
+from linkwind.aero.seldom import Seldom
 from linkwind.aero.source import PythonSource, python_source
 from linkwind.aero.vortex import Vortex
 from linkwind.errors import InputError
@@ -57,7 +59,7 @@ def own(model: object) -> Own:
 
 
 def build(scenario: Scenario, provider: Provider, own: Own | None = None) -> ForceModel:
-    """Return the force model of a provider.
+    """Return the force model of a provider, which answers at every communication point.
 
     Args:
         scenario: all of it.
@@ -68,6 +70,13 @@ def build(scenario: Scenario, provider: Provider, own: Own | None = None) -> For
         InputError: the scenario does not give what the model needs, or the user's model is wrong.
         SimulationError: an FMU cannot be started.
     """
+    if provider.every == 1:
+        return _build(scenario, provider, own)
+    return Seldom(scenario, provider, partial(_build, own=own))
+
+
+def _build(scenario: Scenario, provider: Provider, own: Own | None) -> ForceModel:
+    """Return the force model itself."""
     if provider.model == "fmu" and not isinstance(own, PythonSource):
         from linkwind.aero.fmu import ForceFmu
 

@@ -175,6 +175,10 @@ def _provider_model(scenario: Scenario, provider: Provider, path: Path) -> Itera
         expected = "a table for at least one body"
         advice = f'Add a table for a body, such as {_first(provider.bodies)}, with fx = "…".'
         yield Problem((*path, "field"), expected, "nothing", advice)
+    if provider.every > 1 and provider.model in ("flow", "vortex"):
+        expected = f"1 for the model {provider.model}, whose forces are those of one step"
+        advice = "Leave it out; take a larger coupling.step, with dynamics.substeps."
+        yield Problem((*path, "every"), expected, str(provider.every), advice)
     if provider.model in ("plate", "vortex"):
         yield from _thin(scenario, provider)
     for name in provider.vortex.trailing_edge:

@@ -321,6 +321,11 @@ class Provider(Section):
     bodies: tuple[Name, ...] = Field(
         default=(), strict=False, min_length=1, description="Names of the bodies it acts on; default: all"
     )
+    every: int = Field(
+        default=1,
+        ge=1,
+        description="Steps from one answer of the model to its next; in between its wrench goes on on a line",
+    )
     plate: PlateModel = Field(default=PlateModel(), description="Settings of the model plate")
     field: dict[str, FieldExpressions] = Field(
         default={}, description="The model field: a table for each body, by its name"
