@@ -26,7 +26,7 @@ WRONG = [
     ("mass = 2.0", "mas = 2.0",
      f'bodies[0] "link1".mas: expected a key among {BODY_KEYS}; got "mas". Use "mass".'),
     ("[aero.plate]", "[aero.plat]",
-     'aero.plat: expected a key among name, model, bodies, plate, field, flow, vortex, fmu, python; '
+     'aero.plat: expected a key among name, model, bodies, every, plate, field, flow, vortex, fmu, python; '
      'got "plat". Use "plate".'),
     ("[dynamics]", "[dynamic]",
      f'dynamic: expected a key among {TOP_KEYS}; got "dynamic". Use "dynamics".'),
