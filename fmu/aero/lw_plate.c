@@ -122,18 +122,24 @@ static plate_strip strip_of(const lw_plates *plates, int i, int k) {
     return strip;
 }
 
+/* Where the centre of a strip is in W, and how fast. Where x or z is zero nothing is added to anything. */
+static void strip_centre(const plate_motion *plate, plate_strip strip, lw_vec3 *position, lw_vec3 *velocity) {
+    *position = plate->position, *velocity = plate->linear;
+    if (strip.x != 0.0 || strip.z != 0.0) {
+        const lw_vec3 arm = lw_mat_vec(plate->rotation, lw_vec(strip.x, 0.0, strip.z));
+        *position = lw_add(*position, arm);
+        *velocity = lw_add(*velocity, lw_cross(plate->angular, arm));
+    }
+}
+
 /* Force on a strip, and torque about the centre of mass, in the body frame. Where x or z is zero nothing is added
  * to anything, so that one strip has the bits of a plate without strips. */
 static void strip_wrench(const lw_plates *plates, double t, const plate_motion *plate, plate_strip strip,
                          lw_vec3 *force, lw_vec3 *torque) {
     const lw_vec3 omega = plate->omega;
     const double chord = strip.chord, span = strip.span, x = strip.x, z = strip.z;
-    lw_vec3 position = plate->position, velocity = plate->linear;
-    if (x != 0.0 || z != 0.0) {
-        const lw_vec3 arm = lw_mat_vec(plate->rotation, lw_vec(x, 0.0, z));
-        position = lw_add(position, arm);
-        velocity = lw_add(velocity, lw_cross(plate->angular, arm));
-    }
+    lw_vec3 position, velocity;
+    strip_centre(plate, strip, &position, &velocity);
     const lw_wind_sample air = lw_wind_at(&plates->wind, t, position, velocity);
     const lw_vec3 v = lw_mat_tvec(plate->rotation, lw_sub(velocity, air.velocity));
     double rate = lw_mat_tvec(plate->rotation, air.rate).y;
@@ -148,14 +154,19 @@ static void strip_wrench(const lw_plates *plates, double t, const plate_motion *
     if (x != 0.0) *torque = lw_add(*torque, lw_vec(0.0, -x * force->z, x * force->y));
 }
 
-static int evaluate(const lw_plates *plates, int i, double t, const lw_motion *motion,
-                    lw_unaligned *force, lw_unaligned *torque) {
+static plate_motion motion_of(const lw_plates *plates, int i, const lw_motion *motion) {
     const int32_t b = plates->body[i];
-    const int n = plates->strips;
     plate_motion plate = {lw_load3(motion->position + 3 * b), lw_load3(motion->linear + 3 * b),
                           lw_load3(motion->angular + 3 * b),
                           lw_quat_matrix(lw_load4(motion->orientation + 4 * b)), {0.0, 0.0, 0.0}};
     plate.omega = lw_mat_tvec(plate.rotation, plate.angular);
+    return plate;
+}
+
+static int evaluate(const lw_plates *plates, int i, double t, const lw_motion *motion,
+                    lw_unaligned *force, lw_unaligned *torque) {
+    const int n = plates->strips;
+    const plate_motion plate = motion_of(plates, i, motion);
     lw_vec3 f = {0.0, 0.0, 0.0}, m = {0.0, 0.0, 0.0};
     for (int k = 0; k < n; ++k) { /* from -z to z */
         lw_vec3 strip_f, strip_m;
@@ -212,4 +223,17 @@ int lw_plates_evaluate(const lw_plates *plates, double t, const lw_motion *motio
         }
     }
     return status;
+}
+
+int lw_plates_wind_fault(const lw_plates *plates, int i, double t, const lw_motion *motion, double *place) {
+    const plate_motion plate = motion_of(plates, i, motion);
+    for (int k = 0; k < plates->strips; ++k) {
+        lw_vec3 r, v;
+        strip_centre(&plate, strip_of(plates, i, k), &r, &v);
+        lw_store3(place, r), lw_store3(place + 3, v);
+        if (!isfinite(r.x + r.y + r.z + v.x + v.y + v.z)) return 0;
+        const int fault = lw_wind_fault(lw_wind_at(&plates->wind, t, r, v));
+        if (fault) return fault;
+    }
+    return 0;
 }

@@ -42,4 +42,8 @@ LW_API lw_added_mass lw_plate_added_mass(double density, double chord, double sp
 LW_API int lw_plates_evaluate(const lw_plates *plates, double t, const lw_motion *motion,
                               const lw_wrench *wrench);
 
+/* Of a plate whose wrench is not finite, why: 1 + the component of the wind that is not where it meets the plate, and
+ * position [m] and velocity [m/s] there, place (6); 0 if it is not for the wind. */
+LW_API int lw_plates_wind_fault(const lw_plates *plates, int i, double t, const lw_motion *motion, double *place);
+
 #endif

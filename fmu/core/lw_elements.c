@@ -176,12 +176,13 @@ int lw_elements_check(const lw_multibody *mb, lw_fault *fault) {
 }
 
 int lw_take_time(lw_multibody *mb, double time, lw_fault *fault) {
+    const lw_jet now = {time, 1.0, 0.0};
     mb->time = time;
     for (int32_t i = 0; i < mb->forces; ++i) {
         lw_element *e = &mb->element[i];
         if (e->type != LW_MOTION) continue;
         lw_jet *m = &e->motion;
-        lw_expression_jet(e->code, e->end, mb->constants, time, m);
+        lw_expression_jet(e->code, e->end, mb->constants, &now, m);
         fault->item = i;
         if (!isfinite(m->value) || !isfinite(m->rate) || !isfinite(m->change)) return LW_FORCE_NOT_FINITE;
     }

@@ -104,8 +104,9 @@ static lw_jet jet(double value, double rate, double change) {
     return j;
 }
 
-/* f(x) of which value and derivatives are known. */
+/* f(x) of which value and derivatives are known. However steep f is, it does not change where x does not. */
 static lw_jet chain(double f, double first, double second, lw_jet x) {
+    if (x.rate == 0.0 && x.change == 0.0 && (isinf(first) || isinf(second))) return jet(f, 0.0, 0.0);
     return jet(f, first * x.rate, second * x.rate * x.rate + first * x.change);
 }
 
@@ -173,17 +174,17 @@ static lw_jet binary_jet(int32_t operation, lw_jet x, lw_jet y) {
     }
 }
 
-void lw_expression_jet(const int32_t *code, const int32_t *end, const double *constants, double at,
-                       lw_jet *result) {
+void lw_expression_jet(const int32_t *code, const int32_t *end, const double *constants,
+                       const lw_jet *variables, lw_jet *results) {
     lw_jet stack[LW_EXPRESSION_STACK], local[LW_EXPRESSION_LOCALS], *top = stack, c;
     for (; code != end; code += 2) {
         const int32_t operation = code[0], operand = code[1];
         switch (operation) {
         case LW_CONSTANT: *top++ = jet(constants[operand], 0.0, 0.0); break;
-        case LW_VARIABLE: *top++ = jet(at, 1.0, 0.0); break;
+        case LW_VARIABLE: *top++ = variables[operand]; break;
         case LW_LOCAL: *top++ = local[operand]; break;
         case LW_DEFINE: local[operand] = *--top; break;
-        case LW_RESULT: *result = *--top; break;
+        case LW_RESULT: results[operand] = *--top; break;
         case LW_POWER_INTEGER: top[-1] = integer_jet(top[-1], operand); break;
         case LW_TABLE:
             c = lw_curve(constants + operand, top[-1].value);

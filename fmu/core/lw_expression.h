@@ -24,7 +24,7 @@ enum { /* operations; the operand, where there is one, in brackets */
     LW_TABLE /* the curve at constants + [operand] */
 };
 
-/* A value that depends on one variable, and its first two derivatives. */
+/* A value that changes with one parameter, such as time, and its first two derivatives by that. */
 typedef struct { double value, rate, change; } lw_jet;
 
 /* A curve of cubic pieces at x: number of pieces m, period or 0, the m + 1 places where they begin and end,
@@ -35,8 +35,8 @@ lw_jet lw_curve(const double *table, double x);
 void lw_expression_run(const int32_t *code, const int32_t *end, const double *constants,
                        const double *variables, double *results);
 
-/* The same with a program of one variable, whose result 0 is returned as what it is at `at`. */
-LW_API void lw_expression_jet(const int32_t *code, const int32_t *end, const double *constants, double at,
-                              lw_jet *result);
+/* The same with derivatives: of variables that change, the results and how they do. */
+LW_API void lw_expression_jet(const int32_t *code, const int32_t *end, const double *constants,
+                              const lw_jet *variables, lw_jet *results);
 
 #endif

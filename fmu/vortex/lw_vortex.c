@@ -266,11 +266,11 @@ static void accept(lw_vortex *v, const double *twist) {
     }
 }
 
-void lw_vortex_commit(lw_vortex *v, double t, const double *pose, const double *twist) {
+int lw_vortex_commit(lw_vortex *v, double t, const double *pose, const double *twist) {
     accept(v, twist);
     v->started = 1;
     lw_vortex_place(v, pose);
-    lw_wake_go(v, t);
+    return lw_wake_go(v, t);
 }
 
 void lw_vortex_velocity(lw_vortex *v, double t, int32_t count, const double *point, double *velocity) {

@@ -69,8 +69,9 @@ LW_API int32_t lw_vortex_targets(const lw_vortex *vortex);
 LW_API int lw_vortex_evaluate(lw_vortex *vortex, double t, const double *pose, const double *twist,
                               double *wrench, double *response);
 
-/* Take the state that was accepted at the time t that was evaluated last. */
-LW_API void lw_vortex_commit(lw_vortex *vortex, double t, const double *pose, const double *twist);
+/* Take the state that was accepted at the time t that was evaluated last. Returns 0, or 1 + the first corner of the
+ * wakes that stays where it is, because the wind there is not finite. */
+LW_API int lw_vortex_commit(lw_vortex *vortex, double t, const double *pose, const double *twist);
 
 /* The velocity of the fluid (count, 3) at points (count, 3) [m] at the time t, by bodies and wakes as they are
  * after an evaluation, and by the wind. */

@@ -48,13 +48,14 @@ int32_t lw_wake_filaments(const lw_vortex *v, lw_filament *filaments) {
     return count;
 }
 
-void lw_wake_go(lw_vortex *v, double t) {
+int lw_wake_go(lw_vortex *v, double t) {
     const int32_t n = v->surfaces, s = v->spanwise, across = n * (s + 1);
     const int32_t bodies = lw_vortex_bound(v, v->strength, v->filaments);
     const int32_t filaments = bodies + lw_wake_filaments(v, v->filaments + bodies);
     for (int32_t k = 0; k < filaments; ++k) v->filaments[k].core = v->core; /* the points lie on filaments */
     const int32_t rows = v->rows + 1 < v->capacity ? v->rows + 1 : v->capacity;
     const lw_points points = lw_vortex_room(v, rows * across);
+    int fault = 0;
     for (int32_t k = 0; k < rows * across; ++k) {
         const double *from = edge(v, k % across / (s + 1), k / across, k % (s + 1));
         for (int axis = 0; axis < 3; ++axis) points.at[axis][k] = from[axis];
@@ -63,11 +64,16 @@ void lw_wake_go(lw_vortex *v, double t) {
     for (int32_t k = 0; k < rows * across; ++k) {
         const lw_vec3 r = lw_vec(points.at[0][k], points.at[1][k], points.at[2][k]), zero = {0.0, 0.0, 0.0};
         const lw_vec3 u = lw_vec(points.velocity[0][k], points.velocity[1][k], points.velocity[2][k]);
-        const lw_vec3 wind = lw_wind_at(&v->wind, t, r, zero).velocity;
+        lw_vec3 wind = lw_wind_at(&v->wind, t, r, zero).velocity;
+        if (!isfinite(wind.x + wind.y + wind.z)) {
+            if (!fault) fault = 1 + k;
+            wind = lw_neg(u);
+        }
         lw_store3(v->wake + 3 * k, lw_add(r, lw_scale(v->step, lw_add(wind, u))));
     }
     for (int32_t k = rows * n * s - 1; k >= n * s; --k) v->wake_rings[k] = v->wake_rings[k - n * s];
     for (int32_t k = 0; k < n * s; ++k) /* the last row of each surface's rings */
         v->wake_rings[k] = v->strength[(k / s * v->chordwise + v->chordwise - 1) * s + k % s];
     v->rows = rows;
+    return fault;
 }

@@ -10,7 +10,8 @@ From Python, what ``linkwind run`` does, with the results as arrays::
 
 ``load`` and ``loads`` make a scenario (:mod:`linkwind.scenario`). ``run``, ``verify``, ``resume`` and
 ``serve`` do what the commands do (:mod:`linkwind.api`), also with force models of your own: functions, or
-classes derived from ``ForceModel`` (:mod:`linkwind.aero.base`). ``open_log`` and ``table`` read a log
+classes derived from ``ForceModel`` (:mod:`linkwind.aero.base`), which find the wind of the scenario with
+``Wind`` (:mod:`linkwind.wind`). ``open_log`` and ``table`` read a log
 (:mod:`linkwind.log.reader`), ``export_fmu`` writes an FMU (:mod:`linkwind.fmi.export`). All errors are
 ``LinkwindError`` (:mod:`linkwind.errors`).
 """
@@ -25,6 +26,7 @@ _PUBLIC = {
     "Capabilities": "linkwind.aero.base:Capabilities",
     "ForceModel": "linkwind.aero.base:ForceModel",
     "LinkwindError": "linkwind.errors:LinkwindError",
+    "Wind": "linkwind.wind:Wind",
     "export_fmu": "linkwind.fmi.export:export",
     "load": "linkwind.scenario:load",
     "loads": "linkwind.scenario:loads",

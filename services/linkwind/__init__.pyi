@@ -6,11 +6,13 @@ from linkwind.errors import LinkwindError
 from linkwind.fmi.export import export as export_fmu
 from linkwind.log.reader import open_log
 from linkwind.scenario import load, loads
+from linkwind.wind import Wind
 
 __all__ = [
     "Capabilities",
     "ForceModel",
     "LinkwindError",
+    "Wind",
     "export_fmu",
     "load",
     "loads",

@@ -26,6 +26,7 @@ from linkwind.aero.source import PythonSource, python_source
 from linkwind.aero.vortex import Vortex
 from linkwind.errors import InputError
 from linkwind.scenario import Provider, Scenario
+from linkwind.wind import Wind
 
 __all__ = ["MODELS", "OWN", "Capabilities", "ForceModel", "Own", "PythonSource", "build", "check", "own"]
 
@@ -96,8 +97,9 @@ def check(scenario: Scenario) -> None:
     """Find what is wrong with the settings of a model before anything is started, and log what may be.
 
     Raises:
-        InputError: the scenario does not give what a model needs.
+        InputError: the scenario does not give what a model needs, or its wind is wrong.
     """
+    Wind(scenario)
     for provider in scenario.providers:
         if provider.model not in OWN:
             build(scenario, provider)

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from linkwind.aero.base import Capabilities, body_indices, item
-from linkwind.aero.wind import wind_table
 from linkwind.errors import InputError, ProtocolError, SimulationError
 from linkwind.fmi.host import description, listing, mapping
 from linkwind.fmi.host.derivatives import Derivatives
@@ -18,10 +17,10 @@ from linkwind.fmi.host.instances import Instances
 from linkwind.fmi.host.links import Mapping, elements
 from linkwind.fmi.host.planning import differentiates, interface, own_step_ns, stepping
 from linkwind.fmi.host.transfer import Inputs, Outputs
-from linkwind.native.wind import wind_at
 from linkwind.scenario import Provider, Scenario
 from linkwind.scenario.providers import FmuModel
-from linkwind.spatial import Array, Motion, Wrench
+from linkwind.spatial import Motion, Wrench
+from linkwind.wind import Wind
 
 _log = logging.getLogger("linkwind.fmu")
 _MAGIC = b"LWFMUMDL"
@@ -103,12 +102,8 @@ class ForceFmu:
         found = mapping.resolve(self._fmu, settings, provider.bodies)
         self._mapping = found
         bodies = body_indices(scenario, provider)
-        wind, still = wind_table(scenario.environment), np.zeros(3)
-
-        def wind_there(t: float, position: Array) -> Array:
-            return wind_at(wind, t, position, still)[0]
-
-        self._inputs = Inputs(found, bodies, len(scenario.bodies), wind_there, scenario.environment.density)
+        wind = Wind(scenario).velocity
+        self._inputs = Inputs(found, bodies, len(scenario.bodies), wind, scenario.environment.density)
         self._outputs = Outputs(found, bodies)
         timeout = settings.timeout or scenario.coupling.timeout / 2.0
         self._instances = Instances(self._fmu, found, settings, step_ns, timeout)

@@ -10,11 +10,11 @@ import numpy as np
 from linkwind.aero.base import Capabilities, body_indices
 from linkwind.aero.planform import mean_chord, relative, thin
 from linkwind.aero.section import curves
-from linkwind.aero.wind import wind_table
 from linkwind.errors import ProtocolError, SimulationError
 from linkwind.native.forces import Coefficients, Plates, PlateTable
 from linkwind.scenario import Provider, Scenario
 from linkwind.spatial import Motion, Wrench
+from linkwind.wind import Wind, wind_table
 
 
 def plate_table(scenario: Scenario, provider: Provider) -> PlateTable:
@@ -30,7 +30,7 @@ def plate_table(scenario: Scenario, provider: Provider) -> PlateTable:
         size=np.array([(mean_chord(shape), shape.span) for shape in shapes]),
         coefficients=Coefficients[plate.coefficients.upper()],
         density=scenario.environment.density,
-        wind=wind_table(scenario.environment),
+        wind=wind_table(scenario.environment, scenario.source),
         strips=plate.strips,
         curves=np.zeros((3, 0)) if tabulated is None else curves(tabulated),
         planform=relative(shapes, plate.strips),
@@ -54,7 +54,7 @@ class Plate:
 
     def __init__(self, scenario: Scenario, provider: Provider) -> None:
         self.forces = Plates(plate_table(scenario, provider))
-        self._file, self._bodies = f"{scenario.source}", provider.bodies
+        self._scenario, self._bodies = scenario, provider.bodies
 
     def commit(self, t: float, motion: Motion) -> None:
         """Do nothing: the forces depend on the present alone."""
@@ -63,19 +63,23 @@ class Plate:
         """Write the wrench on the plates for the state at time t [s].
 
         Raises:
-            SimulationError: a wrench is not finite.
+            SimulationError: a wrench, or the wind that it comes from, is not finite.
         """
         status = self.forces.evaluate(t, motion, wrench)
         if status:
             raise self._not_finite(status - 1, t, motion)
 
     def _not_finite(self, plate: int, t: float, motion: Motion) -> SimulationError:
+        if (place := self.forces.wind_fault(plate, t, motion)) is not None:
+            wind = Wind(self._scenario)
+            wind.velocity(t, place[:3])
+            wind.rate(t, place[:3], place[3:])
         body = self.forces.table.body[plate]
         parts = (motion.position, motion.orientation, motion.linear, motion.angular)
         names = ("position", "orientation", "velocity", "angular velocity")
         state = ", ".join(f"{name} {part[body].tolist()}" for name, part in zip(names, parts, strict=True))
         return SimulationError(
-            f'{self._file}: plate "{self._bodies[plate]}": expected a finite wrench at t = {t:.9g} s; got '
+            f'{self._scenario.source}: plate "{self._bodies[plate]}": expected a finite wrench at t = {t:.9g} s; got '
             f"another at {state}. Has the motion diverged? Try a smaller coupling.step."
         )
 

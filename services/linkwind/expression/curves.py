@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from linkwind.expression.spline import slopes
+from linkwind.scenario.functions import Function
 from linkwind.spatial import Array
 
 # How far the last piece of a spline goes on, in parts of its length: a time that is a sum of steps may be a
@@ -60,6 +61,17 @@ class Curve:
             return np.array(slopes(self.points, periodic=self.periodic))
         x, y = np.array(self.points).T
         return _monotone(np.diff(x), np.diff(y) / np.diff(x), periodic=self.periodic)
+
+
+def curve(function: Function) -> Curve:
+    """Return the curve of a function that is stated as a table."""
+    assert function.table is not None
+    return Curve(function.table, function.interpolation, function.periodic)
+
+
+def law(function: Function) -> str | Curve:
+    """Return a function as the compiler takes it: its expression, or its curve."""
+    return function.expression or "" if function.table is None else curve(function)
 
 
 def _monotone(width: Array, slope: Array, *, periodic: bool) -> Array:

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from linkwind.errors import MechanismError
-from linkwind.expression import Curve, Program, compile_program
+from linkwind.expression import Curve, Program, compile_program, curve, law
 from linkwind.mechanism.quaternion import rotate
 from linkwind.mechanism.tree import WORLD, Carrier
 from linkwind.native.expressions import derivatives
@@ -17,7 +17,6 @@ from linkwind.native.multibody import FORCE_TYPES, NQ, Multibody, Tables
 from linkwind.scenario import Body, Circle, Ellipse, Ellipsoid, Polygon, Rectangle, Scenario
 from linkwind.scenario.forces import Actuator, Buoyancy, Force, PointForce, Spring
 from linkwind.scenario.forces import Motion as Prescribed
-from linkwind.scenario.functions import Function
 from linkwind.scenario.shapes import signed_area
 from linkwind.spatial import Array, Motion
 
@@ -183,7 +182,7 @@ def motion_program(motion: Prescribed, end: float, item: str) -> Program:
                 f'{item}.position.interpolation: expected "spline", because a motion without kinks is needed '
                 'for its acceleration; got "linear". Use "spline".'
             )
-        _check_ends(_curve(motion.position), end, item)
+        _check_ends(curve(motion.position), end, item)
     return _program(motion, ("position",), item)
 
 
@@ -218,23 +217,12 @@ def _program(force: Force, keys: tuple[str, ...], item: str) -> Program:
         )
     return compile_program(
         getattr(force, "let", None),
-        {key: _law(function) for key, function in functions.items() if function is not None},
+        {key: law(function) for key, function in functions.items() if function is not None},
         item,
         variables=VARIABLES[force.type],
         components=keys,
         inputs=inputs(force),
     )
-
-
-def _law(function: Function) -> str | Curve:
-    if function.table is None:
-        return function.expression or ""
-    return _curve(function)
-
-
-def _curve(function: Function) -> Curve:
-    assert function.table is not None
-    return Curve(function.table, function.interpolation, function.periodic)
 
 
 # ---- springs ----

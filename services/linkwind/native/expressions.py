@@ -23,7 +23,7 @@ Operation = enum.IntEnum(
 )
 """Instructions, numbered in the order of the header."""
 
-_jet = declare("lw_expression_jet", [ctypes.c_void_p] * 3 + [ctypes.c_double, ctypes.c_void_p], None)
+_jet = declare("lw_expression_jet", [ctypes.c_void_p] * 5, None)
 
 
 def derivatives(
@@ -32,6 +32,6 @@ def derivatives(
     """Return the result of a program of one variable and its first two derivatives, at a value of it."""
     program, numbers = np.array(code, np.int32).reshape(-1, 2), np.array([*constants, 0.0])
     start, result = int(program.__array_interface__["data"][0]), np.zeros(3)
-    _jet(start, start + program.nbytes, address(numbers), at, address(result))
+    _jet(start, start + program.nbytes, address(numbers), address(np.array([at, 1.0, 0.0])), address(result))
     value, rate, change = result.tolist()
     return value, rate, change

@@ -184,6 +184,24 @@ class Plates:
         return self._evaluate(self.at, t, self._motion.at(motion), self._wrench.at(wrench))  # type: ignore[no-any-return]
 
 
+    def wind_fault(self, plate: int, t: float, motion: Motion) -> Array | None:
+        """Return where a plate meets a wind that is not finite, if that is why its wrench is not.
+
+        Args:
+            plate: its index in the table.
+            t: time [s].
+            motion: all bodies of the scenario.
+
+        Returns:
+            Position [m] and velocity [m/s] of the centre of one of its strips, shape (6,); None for another reason.
+        """
+        place = np.zeros(6)
+        pointer = ctypes.c_void_p
+        arguments = [pointer, ctypes.c_int, ctypes.c_double, pointer, pointer]
+        fault = declare("lw_plates_wind_fault", arguments)
+        return place if fault(self.at, plate, t, self._motion.at(motion), address(place)) else None
+
+
 class Field:
     """A force field given as postfix programs.
 

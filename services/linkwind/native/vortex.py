@@ -143,7 +143,7 @@ class VortexLattice:
             setattr(self._struct, name, address(array))
         pointer, number = ctypes.c_void_p, ctypes.c_double
         self._evaluate = declare("lw_vortex_evaluate", [pointer, number, *[pointer] * 4])
-        self._commit = declare("lw_vortex_commit", [pointer, number, pointer, pointer], None)
+        self._commit = declare("lw_vortex_commit", [pointer, number, pointer, pointer])
         self._at = address(self._pose), address(self._twist)
         self._out = address(self.wrench), address(self.response)
 
@@ -161,10 +161,15 @@ class VortexLattice:
         self._pose[:], self._twist[:] = pose, twist
         return not self._evaluate(self._self, t, *self._at, *self._out)
 
-    def commit(self, t: float, pose: Array, twist: Array) -> None:
-        """Take the state that was accepted at the time [s] evaluated last; shed a row of the wakes."""
+    def commit(self, t: float, pose: Array, twist: Array) -> Array | None:
+        """Take the state that was accepted at the time [s] evaluated last; shed a row of the wakes.
+
+        Returns:
+            A corner of the wakes [m] where the wind is not finite, shape (3,), if there is one.
+        """
         self._pose[:], self._twist[:] = pose, twist
-        self._commit(self._self, t, *self._at)
+        fault: int = self._commit(self._self, t, *self._at)
+        return self._arrays["wake"].reshape(-1, 3)[fault - 1] if fault else None
 
     def velocity(self, t: float, point: Array) -> Array:
         """Return the velocity of the fluid [m/s] at points [m], shape (m, 3), after an evaluation."""
@@ -193,6 +198,12 @@ class VortexLattice:
     def surface(self) -> Array:
         """Corners of the surfaces' rings where they were last [m], shape (n, c + 1, s + 1, 3), in W."""
         return self._arrays["placed"]
+
+    @property
+    def targets(self) -> Array:
+        """Where the condition was stated and where forces act, as evaluated last [m], shape (any, 3), in W."""
+        n, c, s = self.table.shape
+        return self._arrays["points"][:3, : n * c * (3 * s + 1)].T
 
     @property
     def wake(self) -> tuple[Array, Array]:

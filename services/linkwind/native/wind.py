@@ -1,69 +1,81 @@
-"""The wind (``fmu/aero/lw_wind.h``): a uniform stream and travelling gusts."""
+"""The wind (``fmu/aero/lw_wind.h``): a uniform stream, functions of time and place, and travelling gusts."""
 
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from linkwind.native.library import declare
 from linkwind.spatial import Array, address
 
 GUST_SHAPES = {"sine": 0, "one_minus_cosine": 1}
+VARIABLES = ("t", "x", "y", "z")  # of the functions
 
 
 @dataclass(frozen=True)
 class WindTable:
-    """A uniform stream with travelling gusts: U0 + Σ a s(2π(f t + k·r) + φ).
+    """A uniform stream with functions and travelling gusts: U0 + u(t, r) + Σ a s(2π(f t + k·r) + φ).
 
     Attributes:
         uniform: U0 [m/s], shape (3,), in W.
         gusts: a [m/s] (3), f [Hz], k [1/m] (3), φ [rad], shape s as ``GUST_SHAPES`` of each gust, shape
             (n, 9), a and k in W.
+        code: operation and operand of each instruction of the program whose results 0, 1, 2 are u along x, y
+            and z, and whose variables are ``VARIABLES``, shape (m, 2).
+        constants: what its instructions push, shape (any,).
     """
 
     uniform: Array
     gusts: Array
+    code: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 2), np.int32))
+    constants: Array = field(default_factory=lambda: np.zeros(0))
 
 
 class WindStruct(ctypes.Structure):
     """``lw_wind``; the table must live as long."""
 
-    _fields_ = [("uniform", ctypes.c_double * 3), ("n_gusts", ctypes.c_int), ("gusts", ctypes.c_void_p)]
+    _fields_ = [
+        ("uniform", ctypes.c_double * 3),
+        ("n_gusts", ctypes.c_int),
+        ("gusts", ctypes.c_void_p),
+        ("instructions", ctypes.c_int),
+        ("code", ctypes.c_void_p),
+        ("constants", ctypes.c_void_p),
+    ]
 
     @classmethod
     def of(cls, wind: WindTable) -> WindStruct:
         """Return a wind as the library takes it."""
         at = address(wind.gusts) if len(wind.gusts) else None
-        return cls((ctypes.c_double * 3)(*wind.uniform), len(wind.gusts), at)
+        code = int(wind.code.__array_interface__["data"][0]) if len(wind.code) else None
+        constants = address(wind.constants) if len(wind.constants) else None
+        uniform = (ctypes.c_double * 3)(*wind.uniform)
+        return cls(uniform, len(wind.gusts), at, len(wind.code), code, constants)
 
 
-class _Vec3(ctypes.Structure):
-    """``lw_vec3``."""
-
-    _fields_ = [(name, ctypes.c_double) for name in "xyz"]
+_pointer = ctypes.c_void_p
+_sample = declare("lw_wind_sample_many", [_pointer, ctypes.c_int, *[_pointer] * 5], None)
 
 
-class _WindSample(ctypes.Structure):
-    """``lw_wind_sample``."""
-
-    _fields_ = [("velocity", _Vec3), ("rate", _Vec3)]
-
-
-def wind_at(wind: WindTable, t: float, r: Array, v: Array) -> tuple[Array, Array]:
-    """Return the wind at a point that moves, and its rate of change there.
+def wind_at(wind: WindTable, t: Array | float, r: Array, v: Array) -> tuple[Array, Array]:
+    """Return the wind at points that move, and its rate of change there.
 
     Args:
         wind: the wind.
-        t: time [s].
-        r: the point [m], shape (3,), in W.
-        v: the point's velocity [m/s], shape (3,), in W.
+        t: time [s], of all points or of each, shape (…).
+        r: the points [m], shape (…, 3), in W.
+        v: their velocities [m/s], shape (…, 3), in W.
 
     Returns:
-        Velocity [m/s] and total derivative ∂U/∂t + (v·∇)U [m/s²], each of shape (3,), in W.
+        Velocity [m/s] and total derivative ∂U/∂t + (v·∇)U [m/s²], each of shape (…, 3), in W.
     """
-    function = declare("lw_wind_at", [ctypes.c_void_p, ctypes.c_double, _Vec3, _Vec3], _WindSample)
-    sample = function(ctypes.byref(WindStruct.of(wind)), t, _Vec3(*r), _Vec3(*v))
-    velocity, rate = sample.velocity, sample.rate
-    return np.array([velocity.x, velocity.y, velocity.z]), np.array([rate.x, rate.y, rate.z])
+    points = np.ascontiguousarray(r, np.float64)
+    speeds = np.ascontiguousarray(np.broadcast_to(v, points.shape), np.float64)
+    times = np.ascontiguousarray(np.broadcast_to(t, points.shape[:-1]), np.float64)
+    velocity, rate = np.zeros(points.shape), np.zeros(points.shape)
+    arrays = (times, points, speeds, velocity, rate)
+    _sample(ctypes.byref(WindStruct.of(wind)), times.size, *map(address, arrays))
+    return velocity, rate

@@ -223,6 +223,11 @@ def _flow(scenario: Scenario, provider: Provider, path: Path) -> Iterator[Proble
         expected = "none: the model flow has a uniform wind"
         got = f"{len(scenario.environment.gusts)} of them"
         yield Problem(("environment", "gusts"), expected, got, "Remove them, or use the model plate.")
+    for index, function in scenario.environment.wind_functions.items():
+        expected = "a number: the model flow has a uniform and steady wind"
+        got = "a table" if function.expression is None else show(function.expression)
+        advice = "Give it one, or use the model plate or vortex."
+        yield Problem(("environment", "wind", index), expected, got, advice)
     if scenario.environment.density == 0.0:
         yield Problem(("environment", "density"), "a number above 0 for the model flow", "0", "Give it one.")
 
@@ -245,10 +250,10 @@ def _flow_in_the_plane(scenario: Scenario, acted: list[tuple[int, Body]]) -> Ite
             expected = f"the span of the others, {spans[0][1]!r} m: the flow is two-dimensional"
             advice = f"Give all the same, {otherwise}"
             yield Problem(("bodies", index, "shape", "span"), expected, show(span), advice)
-    if any(component for component in scenario.environment.wind[2:]):
+    if scenario.environment.uniform_wind[2]:
         expected = "no component along z: the flow is two-dimensional"
         advice = f"Set z to 0, {otherwise}"
-        yield Problem(("environment", "wind"), expected, show(list(scenario.environment.wind)), advice)
+        yield Problem(("environment", "wind"), expected, show(list(scenario.environment.uniform_wind)), advice)
 
 
 def _first(names: Sequence[str]) -> str:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, model_validator
+from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, ValidationError, model_validator
 from pydantic_core import CoreSchema
 
 from linkwind.scenario.points import Points, wrong
-from linkwind.scenario.problems import Problem, ProblemError
-from linkwind.scenario.quantities import Section, quantity
+from linkwind.scenario.problems import Problem, ProblemError, show
+from linkwind.scenario.quantities import Section, quantity, vector
+from linkwind.scenario.translation import problems
 
 
 class Function(Section):
@@ -44,8 +45,8 @@ class Function(Section):
             got = "neither" if self.table is None else "both"
             raise ProblemError([Problem((), "an expression or a table", got, "Give one of the two.")])
         points = self.table or ()
-        if problems := list(wrong(points, periodic=self.periodic)):
-            raise ProblemError([problem.below(("table",)) for problem in problems])
+        if unfit := list(wrong(points, periodic=self.periodic)):
+            raise ProblemError([problem.below(("table",)) for problem in unfit])
         if self.periodic and points and points[-1][1] != points[0][1]:
             closed = (*points[:-1], (points[-1][0], points[0][1]))
             return self.model_copy(update={"table": closed})
@@ -68,5 +69,43 @@ def _motion(value: Any) -> Any:
     return value
 
 
+def _components(value: Any) -> Any:
+    """Return the components of a vector: numbers, and functions where they are none; z may be left out."""
+    if not isinstance(value, list | tuple) or len(value) not in (2, 3):
+        expected = "a list of 2 or 3 components, each a number, an expression or a table"
+        raise ProblemError.value(expected, value, "Write [x, y, z], or [x, y] where z is 0.")
+    if not any(isinstance(component, str | dict | Function) for component in value):
+        return vector(value)
+    components = [_component(component, index) for index, component in enumerate(value)]
+    return (*components, 0.0) if len(components) == 2 else tuple(components)
+
+
+def _component(value: Any, index: int) -> float | Function:
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return vector((value, 0.0))[0]
+    if isinstance(value, Function):
+        return value
+    if not isinstance(value, str | dict):
+        advice = 'For example -5.0, "-5*(y/10)**0.14", or { table = "wind.csv" }.'
+        raise ProblemError([Problem((index,), "a number, an expression or a table", show(value), advice)])
+    try:
+        return Function.model_validate({"expression": value} if isinstance(value, str) else value)
+    except ValidationError as error:
+        raise ProblemError(problem.below((index,)) for problem in problems(error, Function)) from None
+
+
+class _TwoOrThree:
+    """The schema of a list of which the last entry may be left out."""
+
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return it."""
+        entry = handler(core)["prefixItems"][0]
+        return {"type": "array", "items": entry, "minItems": 2, "maxItems": 3}
+
+
 AnyFunction = Annotated[Function, BeforeValidator(_function)]
 AnyMotion = Annotated[Function, BeforeValidator(_motion)]
+
+Component = float | Function
+Components = Annotated[tuple[Component, Component, Component], BeforeValidator(_components), _TwoOrThree()]
+"""Three components of a vector, each a number or a function; two are padded with z = 0."""

@@ -19,7 +19,7 @@ CLOSE = 1e-9  # between first and last value of a table that begins again, in pa
 
 
 def read(data: dict[str, Any], folder: Path | None) -> None:
-    """Put the points of files in the place of their names, wherever force elements have tables.
+    """Put the points of files in the place of their names, wherever force elements or the wind have tables.
 
     What is wrong with a file takes that place as well, and is told with what else is wrong with the scenario.
 
@@ -27,21 +27,30 @@ def read(data: dict[str, Any], folder: Path | None) -> None:
         data: a scenario as plain data; changed in place.
         folder: where names of files start; None if there may be none, in data from elsewhere.
     """
-    forces = data.get("forces")
+    for function in _functions(data):
+        if not isinstance(name := function.get("table"), str):
+            continue
+        if folder is None:
+            advice = "Name files in a scenario's own file or with --set."
+            function["table"] = ProblemError.value("points [variable, value]", name, advice)
+            continue
+        try:
+            points = _file(folder / name, name, periodic=function.get("periodic") is True)
+            function["table"] = [list(point) for point in points]
+        except ProblemError as error:
+            function["table"] = error
+
+
+def _functions(data: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield the functions of a scenario that are written as tables of keys."""
+    forces, environment = data.get("forces"), data.get("environment")
     for force in forces if isinstance(forces, list) else ():
-        for key in FUNCTIONS if isinstance(force, dict) else ():
-            function = force.get(key)
-            if not isinstance(function, dict) or not isinstance(name := function.get("table"), str):
-                continue
-            if folder is None:
-                advice = "Name files in a scenario's own file or with --set."
-                function["table"] = ProblemError.value("points [variable, value]", name, advice)
-                continue
-            try:
-                points = _file(folder / name, name, periodic=function.get("periodic") is True)
-                function["table"] = [list(point) for point in points]
-            except ProblemError as error:
-                function["table"] = error
+        entries = [force.get(key) for key in FUNCTIONS] if isinstance(force, dict) else []
+        yield from (function for function in entries if isinstance(function, dict))
+    wind = environment.get("wind") if isinstance(environment, dict) else None
+    for component in wind if isinstance(wind, list) else ():
+        if isinstance(component, dict):
+            yield component
 
 
 def wrong(points: Sequence[tuple[float, float]], *, periodic: bool) -> Iterator[Problem]:

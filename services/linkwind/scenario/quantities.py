@@ -45,7 +45,8 @@ def numbers(value: Any, expected: str) -> tuple[float, ...]:
     return tuple(finite)
 
 
-def _vector(value: Any) -> Vector3:
+def vector(value: Any) -> Vector3:
+    """Return the three numbers of a list of 2 or 3."""
     expected = "a list of 2 or 3 numbers"
     if not isinstance(value, list | tuple) or len(value) not in (2, 3):
         raise ProblemError.value(expected, value, "Write [x, y, z], or [x, y] where z is 0.")
@@ -94,7 +95,7 @@ def _array(least: int, most: int) -> dict[str, Any]:
     return {"type": "array", "items": _NUMBER, "minItems": least, "maxItems": most}
 
 
-Vector = Annotated[Vector3, BeforeValidator(_vector), WithJsonSchema(_array(2, 3))]
+Vector = Annotated[Vector3, BeforeValidator(vector), WithJsonSchema(_array(2, 3))]
 """Three numbers; two are padded with z = 0."""
 
 TurnRate = Annotated[Vector3, BeforeValidator(_turn_rate), WithJsonSchema({"anyOf": [_NUMBER, _array(3, 3)]})]

@@ -7,9 +7,10 @@ from typing import Literal
 
 from pydantic import Field, field_validator
 
+from linkwind.scenario.functions import Components, Function
 from linkwind.scenario.pictures import Pictures
 from linkwind.scenario.problems import ProblemError
-from linkwind.scenario.quantities import Section, Vector, quantity
+from linkwind.scenario.quantities import Section, Vector, Vector3, quantity
 
 Method = Literal["reduced", "cfe", "incremental"]
 Stabilisation = Literal["none", "baumgarte", "projection"]
@@ -55,13 +56,30 @@ class Environment(Section):
     gravity: Vector = quantity("Acceleration of gravity, in the world", "m/s²", (0.0, -9.81, 0.0))
     density: float = quantity("Density of the fluid", "kg/m³", 1.225, ge=0.0)
     viscosity: float = quantity("Kinematic viscosity of the fluid", "m²/s", 1.5e-5, gt=0.0)
-    wind: Vector = quantity("Velocity of the undisturbed fluid, in the world", "m/s", ZERO)
+    wind: Components = quantity(
+        "Velocity of the undisturbed fluid, in the world: each component a number, an expression of t, x, y and z, "
+        "or a table over t",
+        "m/s",
+        ZERO,
+    )
     gusts: tuple[Gust, ...] = Field(
         default=(), strict=False, description="Waves that travel through the wind"
     )
     picture: Pictures = Field(
         default=(), strict=False, description="What is drawn of what stands still; no force model sees it"
     )
+
+
+    @property
+    def uniform_wind(self) -> Vector3:
+        """What of the wind is the same everywhere and always [m/s]: 0 for a component that is a function."""
+        x, y, z = (0.0 if isinstance(component, Function) else component for component in self.wind)
+        return x, y, z
+
+    @property
+    def wind_functions(self) -> dict[int, Function]:
+        """The components of the wind that are functions, by their number."""
+        return {i: component for i, component in enumerate(self.wind) if isinstance(component, Function)}
 
 
 class Dynamics(Section):

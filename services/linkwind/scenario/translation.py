@@ -133,7 +133,7 @@ def _unknown_key(path: Path, model: type[BaseModel]) -> Problem:
 def _keys(path: Path, model: type[BaseModel]) -> list[str]:
     """Return the keys that the table around a path may have."""
     owner = _model(model, path[:-1]) or model
-    return [*owner.model_fields, "aero"] if owner is model else list(owner.model_fields)
+    return [*owner.model_fields, "aero"] if "providers" in owner.model_fields else list(owner.model_fields)
 
 
 def _unit(field: FieldInfo | None) -> str:

@@ -97,7 +97,7 @@ def plan(scenario: Scenario, provider: Provider) -> Grid:
     length = max(extent(body, dimensions) for body in acted)
     cell = length / flow.cells
     _check_resolution(scenario, provider, acted, cell)
-    wind = environment.wind[:dimensions]
+    wind = environment.uniform_wind[:dimensions]
     step = scenario.coupling.step_ns / 1e9
     fastest = max(math.hypot(*wind), *(_speed(body, dimensions) for body in acted))
     substeps = max(1, math.ceil(fastest * step / cell / MAX_SPEED - 1e-9))
@@ -240,7 +240,7 @@ def _check_window(scenario: Scenario, provider: Provider, size: tuple[int, ...],
 
 def _place(scenario: Scenario, dimensions: int) -> tuple[float, ...]:
     """Return where to put the mechanism: upstream and below, for its wake goes with the wind and upwards."""
-    flow = np.array(scenario.environment.wind[:dimensions])
+    flow = np.array(scenario.environment.uniform_wind[:dimensions])
     up = -np.array(scenario.environment.gravity[:dimensions])
     middle = 0.5 + np.zeros(dimensions) - ASIDE * sum(v / math.hypot(*v) for v in (flow, up) if v.any())
     return tuple(middle.tolist())

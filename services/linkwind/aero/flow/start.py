@@ -20,7 +20,7 @@ class SmoothStart:
     """
 
     def __init__(self, scenario: Scenario, provider: Provider, length: float, first: Array) -> None:
-        wind = scenario.environment.wind[: provider.flow.dimensions]
+        wind = scenario.environment.uniform_wind[: provider.flow.dimensions]
         speed = math.hypot(*wind)
         default = length / speed if speed else 0.0
         stated = provider.flow.start_time

@@ -11,13 +11,12 @@ import numpy as np
 from linkwind.aero.base import Capabilities, body_indices, item
 from linkwind.aero.planform import ends_and_middle, mean_chord, thin
 from linkwind.aero.vortex.surface import middles, surfaces, trailing
-from linkwind.aero.wind import wind_table
 from linkwind.errors import ProtocolError, SimulationError
 from linkwind.frames import Single, WakeFrame, logged
 from linkwind.native.vortex import VortexLattice
-from linkwind.native.wind import wind_at
 from linkwind.scenario import Provider, Scenario
 from linkwind.spatial import Array, Motion, Wrench
+from linkwind.wind import Wind
 
 _log = logging.getLogger("linkwind")
 
@@ -49,7 +48,7 @@ class Vortex:
         self._chords = [mean_chord(wing) for wing in self._wings]
         self._places = [ends_and_middle(wing) for wing in self._wings]
         self._rows = np.array(body_indices(scenario, provider))
-        self._wind = wind_table(scenario.environment)
+        self._wind = Wind(scenario)
         self._h = scenario.coupling.step_ns / 1e9
         frames = provider.vortex.frames
         self._every = max(1, round(scenario.steps / frames)) if frames else 0
@@ -65,7 +64,11 @@ class Vortex:
         )
 
     def commit(self, t: float, motion: Motion) -> None:
-        """Shed what the edges leave behind at time t [s], and carry the wakes on to the next one."""
+        """Shed what the edges leave behind at time t [s], and carry the wakes on to the next one.
+
+        Raises:
+            SimulationError: the wind at a wake is not finite.
+        """
         if t == self._committed:
             return
         pose, twist = self._state(motion)
@@ -74,7 +77,8 @@ class Vortex:
         lattice, step = self._made(t, motion), round(t / self._h)
         shown = self._every and step % self._every == 0
         wake = [part.astype(np.float32) for part in lattice.wake] if shown else []  # before it goes on
-        lattice.commit(t, pose, twist)
+        if (corner := lattice.commit(t, pose, twist)) is not None:
+            self._wind.velocity(t, corner)
         self._due = self._frame(step, *wake) if shown else None
         self._committed = t
 
@@ -83,7 +87,7 @@ class Vortex:
 
         Raises:
             ScenarioError: at the start, it is not clear which edge trails.
-            SimulationError: no strengths of the rings let nothing through, or a force is not finite.
+            SimulationError: no strengths of the rings let nothing through, or a force or the wind is not finite.
         """
         pose, twist = self._state(motion)
         lattice = self._solve(t, motion, pose, twist)
@@ -161,7 +165,7 @@ class Vortex:
         if self._lattice is not None:
             return self._lattice
         arms = middles(self._wings, motion.rotation()[self._rows])
-        wind = np.array([self._air(t, place) for place in motion.position[self._rows] + arms])
+        wind = self._wind.velocity(t, motion.position[self._rows] + arms)
         return self._lay(trailing(self._scenario, self._provider, motion, arms, wind))
 
     def _lay(self, sides: Array) -> VortexLattice:
@@ -178,6 +182,8 @@ class Vortex:
         solved = lattice.evaluate(t, pose, twist)
         self._evaluated = t
         if not solved or not all(map(math.isfinite, lattice.wrench.ravel().tolist())):
+            if all(map(math.isfinite, pose.ravel().tolist())):
+                self._wind.velocity(t, lattice.targets)
             names = ", ".join(f'"{name}"' for name in self._provider.bodies)
             got = lattice.wrench.tolist() if solved else "rings that lie in each other"
             raise SimulationError(
@@ -187,16 +193,13 @@ class Vortex:
             )
         return lattice
 
-    def _air(self, t: float, place: Array) -> Array:
-        return wind_at(self._wind, t, place, np.zeros(3))[0]
-
     def _incidence(self, t: float, motion: Motion) -> tuple[float, float]:
         """Return the largest angle of attack [deg], and the most panels that a point goes in a step."""
         largest, farthest = 0.0, 0.0
         axes = np.swapaxes(motion.rotation()[self._rows], 1, 2)
         for body, chord, places, (x, y, z) in zip(self._rows, self._chords, self._places, axes, strict=True):
             arms = places[:, :1] * x + places[:, 1:] * z
-            wind = self._air(t, motion.position[body] + arms[1])
+            wind = self._wind.velocity(t, motion.position[body] + arms[1])
             speed, angle = 0.0, 0.0
             for arm in arms:
                 air = (wind - motion.linear[body] - np.cross(motion.angular[body], arm)).tolist()

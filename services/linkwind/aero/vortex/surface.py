@@ -8,7 +8,6 @@ import numpy as np
 
 from linkwind.aero.base import body_indices, item
 from linkwind.aero.planform import Thin, chord, ends, mean_chord, middle, thin
-from linkwind.aero.wind import wind_table
 from linkwind.errors import ScenarioError
 from linkwind.native.vortex import SurfaceTable
 from linkwind.scenario import Provider, Scenario
@@ -53,7 +52,7 @@ def surfaces(scenario: Scenario, provider: Provider, sides: Array) -> SurfaceTab
         step=scenario.coupling.step_ns / 1e9,
         core=settings.core * min(map(mean_chord, wings)),
         rows=settings.wake,
-        wind=wind_table(scenario.environment),
+        wind=wind_table(scenario.environment, scenario.source),
         suction=settings.suction,
     )
 
