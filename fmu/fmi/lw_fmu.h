@@ -98,6 +98,9 @@ extern const int32_t lw_fmu_planform_size;
 extern const double lw_fmu_planform[];    /* (n, strips, 3) as lw_plate.h, or none */
 extern const int32_t lw_fmu_gust_count;
 extern const double lw_fmu_gusts[];       /* (gust_count, 9) as lw_wind.h */
+extern const int32_t lw_fmu_wind_instructions;
+extern const int32_t lw_fmu_wind_code[];  /* (wind_instructions, 2) as lw_wind.h */
+extern const double lw_fmu_wind_constants[];
 extern const int32_t lw_fmu_field_start[]; /* (n + 1) as lw_field.h; the bodies are 0 ... n - 1 */
 extern const int32_t lw_fmu_field_code[];
 extern const double lw_fmu_field_constants[];

@@ -68,6 +68,9 @@ void lw_part_create(lw_instance *instance) {
     part->plates.planform = lw_fmu_planform_size ? lw_fmu_planform : NULL;
     part->plates.wind.n_gusts = lw_fmu_gust_count;
     part->plates.wind.gusts = lw_fmu_gusts;
+    part->plates.wind.instructions = lw_fmu_wind_instructions;
+    part->plates.wind.code = lw_fmu_wind_code;
+    part->plates.wind.constants = lw_fmu_wind_constants;
 }
 
 void lw_part_restart(lw_instance *instance) {
@@ -123,6 +126,20 @@ static lw_motion motion(const lw_instance *instance) {
 
 unsigned lw_part_group(unsigned number) { return (void)number, WRENCH; }
 
+/* Say why there is no finite wrench on a body. */
+static int refuse(lw_instance *instance, int body, const lw_motion *now) {
+    double place[6];
+    int wind = lw_fmu_aero_model == LW_AERO_PLATE
+                   ? lw_plates_wind_fault(&instance->part->plates, body, instance->time, now, place)
+                   : 0;
+    if (!wind)
+        return lw_report(instance, LW_FMI_DISCARD, "Expected a finite wrench on body %d but was none at %.9g s.",
+                         body, instance->time);
+    return lw_report(instance, LW_FMI_DISCARD,
+                     "Expected a finite wind along %c on body %d but was none at %.9g s, (%.9g, %.9g, %.9g) m.",
+                     "xyz"[wind - 1], body, instance->time, place[0], place[1], place[2]);
+}
+
 int lw_part_update(lw_instance *instance, unsigned groups) {
     const lw_part *part = instance->part;
     lw_motion now = motion(instance);
@@ -132,9 +149,7 @@ int lw_part_update(lw_instance *instance, unsigned groups) {
     int status = field ? lw_field_evaluate(&part->field, instance->time, &now, instance->store, &wrench)
                        : lw_plates_evaluate(&part->plates, instance->time, &now, &wrench);
     if (!status) return LW_FMI_OK;
-    int body = field ? (status - 1) / 6 : status - 1;
-    return lw_report(instance, LW_FMI_DISCARD, "Expected a finite wrench on body %d but was none at %.9g s.",
-                     body, instance->time);
+    return refuse(instance, field ? (status - 1) / 6 : status - 1, &now);
 }
 
 int32_t lw_part_output_order(void) { return 0; }
@@ -166,8 +181,10 @@ int lw_part_set_input_derivative(lw_instance *instance, uint32_t index, int32_t 
 
 static double norm(const double *row) { return lw_norm(lw_load3(row)); }
 
-static double airspeed(const lw_instance *instance, const double *velocity) {
-    return lw_norm(lw_sub(lw_load3(velocity), lw_load3(AT(WIND))));
+/* Of a body, in the wind at its centre of mass. */
+static double airspeed(const lw_instance *instance, uint32_t body) {
+    const lw_vec3 v = lw_load3(AT(LINEAR) + 3 * body), r = lw_load3(AT(POSITION) + 3 * body);
+    return lw_norm(lw_sub(v, lw_wind_at(&instance->part->plates.wind, instance->time, r, v).velocity));
 }
 
 /* A force law turns with the direction of the air: speeds vary by what they are. */
@@ -177,7 +194,7 @@ double lw_part_scale(const lw_instance *instance, const lw_fmu_variable *variabl
     switch (variable->section) {
     case LW_AERO_POSITION:
     case LW_AERO_ORIENTATION: return 1.0;
-    case LW_AERO_LINEAR: scale = airspeed(instance, AT(LINEAR) + place / 3 * 3); break;
+    case LW_AERO_LINEAR: scale = airspeed(instance, place / 3); break;
     case LW_AERO_ANGULAR: scale = norm(AT(ANGULAR) + place / 3 * 3); break;
     case LW_AERO_WIND: scale = norm(AT(WIND)); break;
     default: break;

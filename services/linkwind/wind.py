@@ -113,8 +113,8 @@ class Wind:
         x, y, z = np.asarray(points)[tuple(at)].tolist()
         speed = np.broadcast_to(velocities, found.shape)[tuple(at)].tolist()
         passed = f", passed with {speed} m/s" if what != "velocity" else ""
-        advice = "Does it divide by zero, or leave a function's domain?"
+        place = f"t = {time:.9g} s, x = {x:.9g}, y = {y:.9g}, z = {z:.9g} m{passed}"
         raise SimulationError(
-            f"{self._source}: environment.{COMPONENTS[component]}: expected a finite {what} at t = {time:.9g} s, "
-            f"x = {x:.9g}, y = {y:.9g}, z = {z:.9g} m{passed}; got {found[(*at, component)]:.9g}. {advice}"
+            f"{self._source}: environment.{COMPONENTS[component]}: expected a finite {what} at {place}; got "
+            f"{found[(*at, component)]:.9g}. Does it divide by zero, or leave a function's domain?"
         )

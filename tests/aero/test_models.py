@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from linkwind import aero
-from linkwind.aero.wind import wind_table
 from linkwind.scenario import Environment, Gust, Provider
 from linkwind.spatial import Motion, Wrench
+from linkwind.wind import wind_table
 from tests.aero.scenes import PLATE, model
 
 FIELD = '\n[aero.field.plate]\nfx = "sin(t) - vx"\ntz = "theta"\n'
@@ -75,10 +75,10 @@ def test_capabilities_are_those_of_an_instantaneous_model_but_for_a_fluid_that_r
 def test_the_wind_table_holds_si_units():
     gust = Gust(amplitude=(1.0, 2.0), frequency=3.0, wavenumber=(4.0, 5.0, 6.0), phase_deg=90.0)
     single = Gust(shape="one_minus_cosine", amplitude=(0.0, 9.0), frequency=1.0)
-    table = wind_table(Environment(wind=(7.0, 8.0), gusts=(gust, single)))
+    table = wind_table(Environment(wind=(7.0, 8.0), gusts=(gust, single)), "x")
     assert table.uniform.tolist() == [7.0, 8.0, 0.0]
     assert table.gusts.tolist() == [
         [1.0, 2.0, 0.0, 3.0, 4.0, 5.0, 6.0, math.pi / 2, 0.0],
         [0.0, 9.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0],
     ]
-    assert wind_table(Environment()).gusts.shape == (0, 9)
+    assert wind_table(Environment(), "x").gusts.shape == (0, 9)

@@ -15,6 +15,7 @@ import numpy as np
 
 from linkwind.native.forces import FieldTable, PlateTable
 from linkwind.native.multibody import Tables
+from linkwind.native.wind import WindTable
 
 ROOT = Path(__file__).resolve().parents[2]
 C = ROOT / "fmu"
@@ -207,6 +208,10 @@ def aero(table: PlateTable | FieldTable, theta=(), *, scalar=False) -> Model:
     constants += f"const int32_t lw_fmu_planform_size = {planform.size};\n"
     constants += _array("double", "planform", planform)
     constants += f"const int32_t lw_fmu_gust_count = {len(gusts)};\n" + _array("double", "gusts", gusts)
+    wind = table.wind if plate else WindTable(np.zeros(3), gusts)
+    constants += f"const int32_t lw_fmu_wind_instructions = {len(wind.code)};\n"
+    constants += _array("int32_t", "wind_code", wind.code if len(wind.code) else [0])
+    constants += _array("double", "wind_constants", wind.constants if len(wind.constants) else [0.0])
     constants += _array("int32_t", "field_start", field[0]) + _array("int32_t", "field_code", field[1])
     constants += _array("double", "field_constants", field[2])
     constants += _array("double", "theta", theta if len(theta) else np.zeros(n))

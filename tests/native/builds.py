@@ -29,7 +29,7 @@ def compiled(name):
     hook = build_hook()
     folders = ("core", "aero", "flow", "vortex")
     sources = [*(C / "flow").glob("*.c"), *(C / "vortex").glob("*.c")]
-    sources += [C / "core" / "lw_linear.c", C / "aero" / "lw_wind.c"]
+    sources += [C / "core" / "lw_linear.c", C / "aero" / "lw_wind.c", C / "core" / "lw_expression.c"]
     arguments = [*hook.FLAGS, *hook.WARNINGS, "-Werror", "-O3", "-pthread", "-shared", *extra]
     arguments += [*(f"-I{C / inner}" for inner in folders), *map(str, sorted(sources)), "-lm"]
     with tempfile.TemporaryDirectory() as folder:

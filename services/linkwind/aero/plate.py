@@ -79,8 +79,8 @@ class Plate:
         names = ("position", "orientation", "velocity", "angular velocity")
         state = ", ".join(f"{name} {part[body].tolist()}" for name, part in zip(names, parts, strict=True))
         return SimulationError(
-            f'{self._scenario.source}: plate "{self._bodies[plate]}": expected a finite wrench at t = {t:.9g} s; got '
-            f"another at {state}. Has the motion diverged? Try a smaller coupling.step."
+            f'{self._scenario.source}: plate "{self._bodies[plate]}": expected a finite wrench at '
+            f"t = {t:.9g} s; got another at {state}. Has the motion diverged? Try a smaller coupling.step."
         )
 
     def save(self) -> bytes:

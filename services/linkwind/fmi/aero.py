@@ -17,8 +17,10 @@ from linkwind.mechanism import Mechanism
 from linkwind.native.expressions import Operation
 from linkwind.native.forces import VARIABLES, FieldTable
 from linkwind.native.multibody import Multibody
+from linkwind.native.wind import VARIABLES as WIND_VARIABLES
 from linkwind.scenario import Provider, Scenario
 from linkwind.spatial import Motion
+from linkwind.wind import wind_table
 
 # What length and span are, by the type of the shape.
 _SIDES = {
@@ -31,6 +33,12 @@ _SIDES = {
         "Span of the wing {}, along z of the body frame, with which its planform scales",
     ),
 }
+
+# What the parameter wind is, without and with functions in the scenario's wind.
+_ABOUT_WIND = (
+    "Velocity of the undisturbed fluid, in W",
+    "Velocity that is added to the scenario's functions of the wind, in W",
+)
 
 # What a variable of a field's expressions is read from.
 _READ_FROM = {
@@ -93,9 +101,13 @@ def _plate_parameters(body: str, *environment: str) -> Dependences:
 
 
 def _plates_read(scenario: Scenario, provider: Provider) -> list[Dependences]:
-    """A plate meets the wind at its place and time if there are gusts."""
-    whats = ("r", "orientation", "v", "w") if scenario.environment.gusts else ("orientation", "v", "w")
-    time = ("time",) if scenario.environment.gusts else ()
+    """A plate meets the wind at its place and time, where gusts or functions depend on them."""
+    table = wind_table(scenario.environment, scenario.source)
+    pushed = {WIND_VARIABLES[operand] for operation, operand in table.code if operation == Operation.VARIABLE}
+    gusty = bool(scenario.environment.gusts)
+    time = ("time",) if gusty or "t" in pushed else ()
+    place = ("r",) if gusty or pushed & {"x", "y", "z"} else ()
+    whats = (*place, "orientation", "v", "w")
     return [
         tuple(map(Dependence, (*time, *(f"{body}.{what}" for what in whats)))) for body in provider.bodies
     ]
@@ -119,9 +131,9 @@ def _parameters(scenario: Scenario, provider: Provider) -> Iterator[Variable]:
         return
     environment, shapes = scenario.environment, thin(scenario, provider)
     size = plate_table(scenario, provider).size
-    density, wind = environment.density, np.array(environment.wind)
+    density, wind = environment.density, np.array(environment.uniform_wind)
     yield parameter("density", "DENSITY", 0, density, units.DENSITY, "Density of the fluid")
-    yield parameter("wind", "WIND", 0, wind, units.VELOCITY, "Velocity of the undisturbed fluid, in W")
+    yield parameter("wind", "WIND", 0, wind, units.VELOCITY, _ABOUT_WIND[bool(environment.wind_functions)])
     for i, body in enumerate(provider.bodies):
         for column, what in enumerate(("length", "span")):
             yield parameter(

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from linkwind.aero.field import field_table, initial_angles
 from linkwind.aero.plate import plate_table
-from linkwind.aero.wind import wind_table
 from linkwind.errors import InputError
 from linkwind.fmi import aero, dynamics
 from linkwind.fmi.layout import aero_sections, dynamics_sections, starts
@@ -20,6 +19,7 @@ from linkwind.fmi.variables import Variable, scalars
 from linkwind.mechanism import Mechanism, build
 from linkwind.scenario import Provider, Scenario
 from linkwind.spatial import Array
+from linkwind.wind import wind_table
 
 PartName = Literal["dynamics", "aero"]
 EXPORTABLE = ("plate", "field")
@@ -176,8 +176,14 @@ def provider_part(scenario: Scenario, provider: Provider, *, native_arrays: bool
 
 
 def _plate_constants(scenario: Scenario, provider: Provider) -> dict[str, Table]:
-    gusts = wind_table(scenario.environment).gusts
-    wind: dict[str, Table] = {"gust_count": len(gusts), "gusts": gusts}
+    table = wind_table(scenario.environment, scenario.source)
+    wind: dict[str, Table] = {
+        "gust_count": len(table.gusts),
+        "gusts": table.gusts,
+        "wind_instructions": len(table.code),
+        "wind_code": table.code,
+        "wind_constants": table.constants,
+    }
     if provider.model != "plate":
         return {
             "coefficients": 0,

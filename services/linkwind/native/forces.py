@@ -183,7 +183,6 @@ class Plates:
         """
         return self._evaluate(self.at, t, self._motion.at(motion), self._wrench.at(wrench))  # type: ignore[no-any-return]
 
-
     def wind_fault(self, plate: int, t: float, motion: Motion) -> Array | None:
         """Return where a plate meets a wind that is not finite, if that is why its wrench is not.
 
@@ -193,7 +192,7 @@ class Plates:
             motion: all bodies of the scenario.
 
         Returns:
-            Position [m] and velocity [m/s] of the centre of one of its strips, shape (6,); None for another reason.
+            Position [m] and velocity [m/s] of the centre of one of its strips, shape (6,), or None.
         """
         place = np.zeros(6)
         pointer = ctypes.c_void_p

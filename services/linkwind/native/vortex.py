@@ -201,7 +201,7 @@ class VortexLattice:
 
     @property
     def targets(self) -> Array:
-        """Where the condition was stated and where forces act, as evaluated last [m], shape (any, 3), in W."""
+        """Where fluid passes no wing and where forces act, as evaluated last [m], shape (any, 3), in W."""
         n, c, s = self.table.shape
         return self._arrays["points"][:3, : n * c * (3 * s + 1)].T
 

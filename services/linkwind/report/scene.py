@@ -7,14 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from linkwind.native.wind import wind_at
 from linkwind.report.arrays import every_nth, pack
 from linkwind.report.data import Run
 from linkwind.report.wires import Line, wires
+from linkwind.scenario import Environment
 from linkwind.scenario import pictures as drawings
 from linkwind.scenario.ears import triangles
 from linkwind.scenario.pictures import pictures_of
 from linkwind.scenario.shapes import Ellipsoid, Polygon, Wing, shape_of
 from linkwind.spatial import Array
+from linkwind.wind import wind_table
 
 FRAMES = 1500
 SHEETS = ("plate", "wing")  # shapes without thickness
@@ -27,6 +30,7 @@ def scene(run: Run) -> dict[str, Any] | None:
         return None
     frames = every_nth(len(path.t), FRAMES)
     environment = run.scenario["environment"]
+    air = _air(run, path.t[frames], path.position[frames])
     return {
         "t": pack(path.t[frames], "f8"),
         "position": pack(path.position[frames]),
@@ -37,9 +41,32 @@ def scene(run: Run) -> dict[str, Any] | None:
         "planar": flat(run),
         "up": "z" if upwards(run)[2] else "y",
         "still": [line for picture in pictures_of(environment) for line in _as_data(wires(picture))],
-        "wind": environment["wind"],
-        "gusts": bool(environment["gusts"]),
+        "wind": environment["wind"] if air is None else _mean(air),
+        "air": None if air is None else pack(air),
     }
+
+
+def _air(run: Run, t: Array, position: Array) -> Array | None:
+    """Return the wind at the centre of mass of all [m/s], shape (k, 3); None where it is uniform and steady.
+
+    Args:
+        run: with the scenario.
+        t: times [s], shape (k,).
+        position: of the bodies [m], shape (k, n, 3).
+    """
+    stated = {key: run.scenario["environment"][key] for key in ("wind", "gusts")}
+    if not stated["gusts"] and not any(isinstance(component, Mapping) for component in stated["wind"]):
+        return None
+    mass = np.array([max(body["mass"], 1e-12) for body in run.scenario["bodies"]])[:, None]
+    centre = (mass * position).sum(axis=1) / mass.sum()
+    table = wind_table(Environment.model_validate(stated), run.scenario["name"])
+    return wind_at(table, t, centre, np.zeros(3))[0]
+
+
+def _mean(air: Array) -> list[float]:
+    """Return the mean of the winds [m/s] that are finite; 0 where there is none."""
+    finite = air[np.isfinite(air).all(axis=1)]
+    return (finite.mean(axis=0) if len(finite) else np.zeros(3)).tolist()
 
 
 def flat(run: Run) -> bool:

@@ -38,6 +38,7 @@ _UNITS = {
     "happened": "s",
     "at": "s",
 }
+_ROWS = 40  # of a list, all of which the scenario as logged has
 _FIRST = ("name", "type", "model", "parent", "child", "mass", "inertia", "shape", "position")
 _SETTINGS = ("time", "environment", "dynamics", "coupling", "bus", "log")
 
@@ -128,7 +129,10 @@ def _text(value: Any) -> str:
         case [*items] if all(isinstance(item, float | int) for item in items):
             return "(" + ", ".join(number(item) for item in items) + ")"
         case [*items]:
-            return "<br>".join(_text(item) for item in items)
+            shown = items if len(items) <= _ROWS else [*items[: _ROWS // 2], f"… {len(items)} in all"]
+            return "<br>".join(_text(item) for item in shown)
+        case {"expression": str(text)}:
+            return escape(text)
         case Mapping():
             return ", ".join(_part(key, value[key]) for key in _ordered(value) if value[key])
         case _:

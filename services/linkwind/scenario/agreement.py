@@ -250,10 +250,11 @@ def _flow_in_the_plane(scenario: Scenario, acted: list[tuple[int, Body]]) -> Ite
             expected = f"the span of the others, {spans[0][1]!r} m: the flow is two-dimensional"
             advice = f"Give all the same, {otherwise}"
             yield Problem(("bodies", index, "shape", "span"), expected, show(span), advice)
-    if scenario.environment.uniform_wind[2]:
+    wind = scenario.environment.uniform_wind
+    if wind[2]:
         expected = "no component along z: the flow is two-dimensional"
         advice = f"Set z to 0, {otherwise}"
-        yield Problem(("environment", "wind"), expected, show(list(scenario.environment.uniform_wind)), advice)
+        yield Problem(("environment", "wind"), expected, show(list(wind)), advice)
 
 
 def _first(names: Sequence[str]) -> str:

@@ -57,8 +57,8 @@ class Environment(Section):
     density: float = quantity("Density of the fluid", "kg/m³", 1.225, ge=0.0)
     viscosity: float = quantity("Kinematic viscosity of the fluid", "m²/s", 1.5e-5, gt=0.0)
     wind: Components = quantity(
-        "Velocity of the undisturbed fluid, in the world: each component a number, an expression of t, x, y and z, "
-        "or a table over t",
+        "Velocity of the undisturbed fluid, in the world: each component a number, an expression of t, x, y "
+        "and z, or a table over t",
         "m/s",
         ZERO,
     )
@@ -68,7 +68,6 @@ class Environment(Section):
     picture: Pictures = Field(
         default=(), strict=False, description="What is drawn of what stands still; no force model sees it"
     )
-
 
     @property
     def uniform_wind(self) -> Vector3:

@@ -87,7 +87,7 @@ class Vortex:
 
         Raises:
             ScenarioError: at the start, it is not clear which edge trails.
-            SimulationError: no strengths of the rings let nothing through, or a force or the wind is not finite.
+            SimulationError: no strengths of the rings let nothing through; force or wind is not finite.
         """
         pose, twist = self._state(motion)
         lattice = self._solve(t, motion, pose, twist)

@@ -12,6 +12,7 @@ from linkwind.errors import ScenarioError
 from linkwind.native.vortex import SurfaceTable
 from linkwind.scenario import Provider, Scenario
 from linkwind.spatial import Array, Motion
+from linkwind.wind import wind_table
 
 ACROSS = 0.1  # share of the velocity along the chord below which no edge is clearly the trailing one
 

@@ -41,6 +41,11 @@ export function makeMotion(scene, times) {
     });
   }
 
+  // The wind at the centre [m/s], and how far it has blown since the first frame [m].
+  const blown = scene.air ? makeAir(unpack(scene.air), times) : {
+    air: () => scene.wind, drift: (t) => scene.wind.map((part) => part * t),
+  };
+
   const centre = (now) => [0, 1, 2].map(
     (k) => now.reduce((sum, pose, b) => sum + pose.at[k] * scene.bodies[b].mass, 0) / total);
 
@@ -51,10 +56,36 @@ export function makeMotion(scene, times) {
   }
   let world = null;
   return {
-    scene, times, poses, centre, largest,
+    scene, times, poses, centre, largest, ...blown,
     path: Array.from(times, (t) => centre(poses(t))),
     get world() { return (world ??= extents(scene, poses, centre, times)); },
   };
+}
+
+// A wind given at some times: linear between two of them.
+function makeAir(velocity, times) {
+  const all = times.length, way = new Float64Array(velocity.length);
+  for (let n = 3; n < velocity.length; n++) {
+    const i = Math.floor(n / 3), mean = 0.5 * (velocity[n] + velocity[n - 3]);
+    way[n] = way[n - 3] + (isFinite(mean) ? mean * (times[i] - times[i - 1]) : 0);
+  }
+
+  function between(t) {
+    const i = indexAt(times, t), j = Math.min(i + 1, all - 1);
+    return [i, j, j > i ? (t - times[i]) / (times[j] - times[i]) : 0];
+  }
+
+  function air(t) {
+    const [i, j, f] = between(t);
+    return [0, 1, 2].map((k) => mix(velocity[3 * i + k], velocity[3 * j + k], f));
+  }
+
+  function drift(t) {
+    const [i, j, f] = between(t);
+    return [0, 1, 2].map((k) => mix(way[3 * i + k], way[3 * j + k], f));
+  }
+
+  return { air, drift };
 }
 
 // The middle of the mechanism and of points around it; how far they reach from there along the axes, and at all [m].

@@ -130,17 +130,18 @@ export function makeScene(canvas, motion, clock) {
 
   // The undisturbed wind as streaks that drift with it, in the world that the camera looks at.
   function streaks(t) {
-    if (!windSpeed) return;
-    const wind = camera.turn(scene.wind), c = camera.turn(camera.centre);
+    const wind = camera.turn(motion.air(t)), moved = camera.turn(motion.drift(t)), c = camera.turn(camera.centre);
+    const speed = length(wind);
+    if (!(speed > 0)) return;
     pen.strokeStyle = colour("wind");
     pen.globalAlpha = 0.35;
     pen.lineWidth = 1.2;
     const wrap = (value, period) => ((value % period) + period) % period;
     const w = camera.w + 80, h = camera.h + 80;
     for (let i = 0; i < 36; i++) {
-      const x = wrap(0.7548777 * i * w + (wind[0] * t - c[0]) * camera.scale, w) - 40;
-      const y = wrap(0.5698403 * i * h - (wind[1] * t - c[1]) * camera.scale, h) - 40;
-      pen.beginPath(); pen.moveTo(x, y); pen.lineTo(x - 26 * wind[0] / windSpeed, y + 26 * wind[1] / windSpeed); pen.stroke();
+      const x = wrap(0.7548777 * i * w + (moved[0] - c[0]) * camera.scale, w) - 40;
+      const y = wrap(0.5698403 * i * h - (moved[1] - c[1]) * camera.scale, h) - 40;
+      pen.beginPath(); pen.moveTo(x, y); pen.lineTo(x - 26 * wind[0] / speed, y + 26 * wind[1] / speed); pen.stroke();
     }
     pen.globalAlpha = 1;
   }
@@ -223,11 +224,12 @@ export function makeScene(canvas, motion, clock) {
   }
 
   // Scales and directions, on strips that keep them readable.
-  function key() {
+  function key(t) {
+    const wind = motion.air(t), speed = length(wind);
     pen.fillStyle = colour("card");
     pen.globalAlpha = 0.82;
     pen.fillRect(0, camera.h - 44, camera.w, 26);
-    if (windSpeed) pen.fillRect(0, 8, 200, 34);
+    if (scene.air || windSpeed) pen.fillRect(0, 8, scene.air ? 240 : 200, 34);
     pen.globalAlpha = 1;
     pen.textAlign = "left";
     pen.lineWidth = 2;
@@ -246,11 +248,11 @@ export function makeScene(canvas, motion, clock) {
       arrow(pen, [x, y - 3], [x + newton * unit, y - 3], 11);
       pen.fillText(`${number(newton)} N${camera.w < 440 ? "" : " aerodynamic force"}`, x + newton * unit + 7, y + 1);
     }
-    if (windSpeed) {
-      const along = camera.turn(scene.wind).map((part) => part / windSpeed * 46);
+    if (scene.air || windSpeed) {
+      const along = camera.turn(wind).map((part) => part / speed * 46);
       pen.strokeStyle = pen.fillStyle = colour("wind");
       arrow(pen, [38 - along[0] / 2, 26 + along[1] / 2], [38 + along[0] / 2, 26 - along[1] / 2], 11);
-      pen.fillText(`wind ${number(windSpeed)} m/s${scene.gusts ? ", with gusts" : ""}`, 70, 30);
+      pen.fillText(`wind ${number(speed)} m/s${scene.air ? " at the bodies" : ""}`, 70, 30);
     }
     if (!scene.planar) triad();
   }
@@ -288,7 +290,7 @@ export function makeScene(canvas, motion, clock) {
     bodies(now, 1, filmed);
     forces(now);
     joints(now, t);
-    key();
+    key(t);
   }
 
   function resize() {

@@ -21,6 +21,8 @@ export function makePoses(scene) {
     get largest() { return overview.largest; },
     centre: overview.centre,
     poses: (t) => (at(t) ?? newest.at(-1) ?? overview).poses(t),
+    air: (t) => (at(t) ?? newest.at(-1) ?? overview).air(t),
+    drift: (t) => overview.drift(t),
     detailed: (t) => covers(detail, t),
     set overview(next) {
       overview = piece(next);
