@@ -8,7 +8,7 @@ import numpy as np
 
 from linkwind.errors import SimulationError
 from linkwind.expression import compile_program, law
-from linkwind.native.wind import GUST_SHAPES, VARIABLES, WindTable, wind_at
+from linkwind.native.wind import GUST_SHAPES, VARIABLES, Sampler, WindTable
 from linkwind.scenario import Environment, Scenario
 from linkwind.spatial import Array
 
@@ -67,7 +67,7 @@ class Wind:
             ExpressionError: an expression is wrong.
         """
         self._source = scenario.source
-        self.table = wind_table(scenario.environment, scenario.source)
+        self._at = Sampler(wind_table(scenario.environment, scenario.source))
 
     def velocity(self, t: Array | float, points: Array) -> Array:
         """Return the velocity of the wind.
@@ -82,7 +82,7 @@ class Wind:
         Raises:
             SimulationError: it is not finite.
         """
-        velocity, _ = wind_at(self.table, t, points, STILL)
+        velocity, _ = self._at(t, points, STILL)
         if not np.isfinite(velocity).all():
             self._refuse(t, points, STILL, velocity, "velocity")
         return velocity
@@ -101,7 +101,7 @@ class Wind:
         Raises:
             SimulationError: it is not finite.
         """
-        _, rate = wind_at(self.table, t, points, velocities)
+        _, rate = self._at(t, points, velocities)
         if not np.isfinite(rate).all():
             self._refuse(t, points, velocities, rate, "rate of change")
         return rate

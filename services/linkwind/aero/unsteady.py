@@ -26,7 +26,7 @@ def unsteady(scenario: Scenario) -> Iterator[str]:
 def at_start(scenario: Scenario) -> list[list[float]]:
     """Return the wind without gusts [m/s] that each body meets at the start, shape (n, 3).
 
-    A body whose position follows from joints meets it at the origin, which is near enough to say how fast it is.
+    One whose position follows from joints is taken to be at the origin, which is near enough for a note.
     """
     places = np.array([body.position or (0.0, 0.0, 0.0) for body in scenario.bodies])
     wind, _ = wind_at(_functions(scenario), 0.0, places, STILL)
@@ -58,13 +58,12 @@ def _tables_too_short(scenario: Scenario) -> Iterator[str]:
             (first > 0.0 and one != table[1][1], first, one),
             (last < end and other != table[-2][1], last, other),
         )
-        for cut, t, value in cuts:
-            if cut:
-                yield (
-                    f"{scenario.source}: environment.wind[{index}].table: it goes from {first:g} to {last:g} s "
-                    f"and the run from 0 to {end:g} s; beyond {t:g} s it stays at {value:g} m/s. Add rows (two "
-                    "of one value say that it is meant), or repeat it with periodic = true."
-                )
+        for t, value in ((t, value) for cut, t, value in cuts if cut):
+            yield (
+                f"{scenario.source}: environment.wind[{index}].table: it goes from {first:g} to {last:g} s "
+                f"and the run from 0 to {end:g} s; beyond {t:g} s it stays at {value:g} m/s. Add rows (two "
+                "of one value say that it is meant), or repeat it with periodic = true."
+            )
 
 
 def _winds_too_fast(scenario: Scenario) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -60,6 +61,27 @@ _pointer = ctypes.c_void_p
 _sample = declare("lw_wind_sample_many", [_pointer, ctypes.c_int, *[_pointer] * 5], None)
 
 
+class Sampler:
+    """A wind that is asked for again and again."""
+
+    def __init__(self, table: WindTable) -> None:
+        self._table = table  # its memory is the library's
+        self._struct = WindStruct.of(table)
+        self._at = ctypes.addressof(self._struct)
+
+    def __call__(self, t: Array | float, r: Array, v: Array) -> tuple[Array, Array]:
+        """Return the wind at points that move, and its rate of change there; see ``wind_at``."""
+        shape = np.shape(r)
+        n = math.prod(shape[:-1])
+        room = np.empty(13 * n)
+        points, speeds, velocity, rate = room[n:].reshape((4, *shape))
+        room[:n].reshape(shape[:-1])[...] = t
+        points[...], speeds[...] = r, v
+        at = address(room)
+        _sample(self._at, n, *(at + 8 * n * first for first in (0, 1, 4, 7, 10)))
+        return velocity, rate
+
+
 def wind_at(wind: WindTable, t: Array | float, r: Array, v: Array) -> tuple[Array, Array]:
     """Return the wind at points that move, and its rate of change there.
 
@@ -72,10 +94,4 @@ def wind_at(wind: WindTable, t: Array | float, r: Array, v: Array) -> tuple[Arra
     Returns:
         Velocity [m/s] and total derivative ∂U/∂t + (v·∇)U [m/s²], each of shape (…, 3), in W.
     """
-    points = np.ascontiguousarray(r, np.float64)
-    speeds = np.ascontiguousarray(np.broadcast_to(v, points.shape), np.float64)
-    times = np.ascontiguousarray(np.broadcast_to(t, points.shape[:-1]), np.float64)
-    velocity, rate = np.zeros(points.shape), np.zeros(points.shape)
-    arrays = (times, points, speeds, velocity, rate)
-    _sample(ctypes.byref(WindStruct.of(wind)), times.size, *map(address, arrays))
-    return velocity, rate
+    return Sampler(wind)(t, r, v)
