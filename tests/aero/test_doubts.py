@@ -32,6 +32,7 @@ def test_there_are_none_about_what_comes_along(name: str) -> None:
     [
         (["environment.wind=[-50,0,0]"], True),
         (["environment.gusts=[{amplitude=[1,0,0],frequency=1}]"], True),
+        (["environment.wind=['y',0,0]"], True),
         (["environment.wind=[-50,0,0]", "aero.model=none"], False),
         (["environment.wind=[-50,0,0]", "aero.model=plate"], False),
     ],
@@ -108,6 +109,43 @@ def test_gusts_that_are_over_in_a_few_steps(frequency: float, told: bool) -> Non
     if frequency == -300.0:
         assert "takes 3.3 steps of 0.001 s" in found[0]
         assert "coupling.step of 0.00042 s or less" in found[0]
+
+
+@pytest.mark.parametrize(
+    ("table", "told"),
+    [
+        (
+            "[[0, 1], [0.9, 2]]",
+            ["goes from 0 to 0.9 s and the run from 0 to 1.2 s; beyond 0.9 s it stays at 2"],
+        ),
+        (
+            "[[0.3, 1], [1.2, 2]]",
+            ["goes from 0.3 to 1.2 s and the run from 0 to 1.2 s; beyond 0.3 s it stays"],
+        ),
+        ("[[0, 1], [1.2, 2]]", []),
+        ("[[0, 1], [0.5, 2], [0.6, 2]]", []),  # meant to stay there
+        ("[[0, 1], [0.5, 2], [0.6, 1]], periodic = true", []),
+    ],
+)
+def test_tables_that_are_shorter_than_the_run(table: str, told: list[str]) -> None:
+    found = list(doubts(load("two_link", [f"environment.wind.0={{ table = {table} }}"])))
+    assert len(found) == len(told)
+    assert all(doubt.startswith("two_link.toml: environment.wind[0].table: it ") for doubt in found)
+    assert all(text in doubt for text, doubt in zip(told, found, strict=True))
+
+
+@pytest.mark.parametrize(("frequency", "told"), [(110.0, False), (300.0, True), (4900.0, True)])
+def test_winds_that_are_over_in_a_few_steps(frequency: float, told: bool) -> None:
+    """As gusts: eight steps of 1 ms in a cycle are 125 Hz, and 300 Hz want 0.42 ms."""
+    found = list(doubts(load("two_link", [f"environment.wind.1=2 + 0.5*sin(2*pi*{frequency}*t)"])))
+    expected = "two_link.toml: environment.wind[1]: within a step of 0.001 s it goes up to "
+    assert [doubt.startswith(expected) for doubt in found] == [True] * told
+    if frequency == 300.0:
+        assert 0.35e-3 < float(found[0].rsplit("of about ", 1)[1].split(" s")[0]) < 0.45e-3
+
+
+def test_a_profile_over_height_is_nothing_to_tell() -> None:
+    assert list(doubts(load("two_link", ["environment.wind.0=-5*(max(y,0.1)/10)**0.14"]))) == []
 
 
 @pytest.mark.parametrize(

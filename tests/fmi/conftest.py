@@ -10,7 +10,7 @@ import pytest
 from linkwind.fmi.export import Exported, content_of, export
 from linkwind.fmi.part import EXPORTABLE
 from linkwind.scenario import builtin_names, load
-from tests.fmi.scenes import eventful, servo, spatial
+from tests.fmi.scenes import eventful, servo, sheared, spatial
 
 # part, version of FMI, arrays
 FORMS = [
@@ -29,7 +29,7 @@ SCENARIOS = (
 
 @cache
 def scenario(name: str):
-    own = {"spatial": spatial, "eventful": eventful, "servo": servo}
+    own = {"spatial": spatial, "eventful": eventful, "servo": servo, "sheared": sheared}
     return own[name]() if name in own else load(name)
 
 

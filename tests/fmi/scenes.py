@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from linkwind.scenario import Scenario, loads
+from linkwind.scenario import Scenario, load, loads
 
 SPATIAL = """
 [time]
@@ -313,3 +313,9 @@ step = 1e-3
 def servo() -> Scenario:
     """An arm with a motor, a controlled elbow and a jet, that brakes and drops its load on command."""
     return loads(SERVO, "servo.toml")
+
+
+def sheared() -> Scenario:
+    """Two plates in a wind of which each component is of another kind."""
+    wind = "['-5*(max(y, 0.1)/10)**0.14', { table = [[0, 1], [0.05, 2], [0.1, 1]], periodic = true }, 0.5]"
+    return load("two_link", [f"environment.wind={wind}", "aero.plate.strips=2"])

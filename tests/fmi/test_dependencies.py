@@ -91,7 +91,8 @@ def changes(probe: Probe, known: int, unknowns: list[int]) -> dict[int, tuple[np
     [("spatial", "dynamics", "Output"), ("spatial", "dynamics", "ContinuousStateDerivative"),
      ("spatial", "dynamics", "InitialUnknown"), ("servo", "dynamics", "Output"),
      ("servo", "dynamics", "ContinuousStateDerivative"), ("two_link_free", "dynamics", "InitialUnknown"),
-     ("two_link", "aero", "InitialUnknown"), ("two_link_gust", "aero", "Output")],
+     ("two_link", "aero", "InitialUnknown"), ("two_link_gust", "aero", "Output"),
+     ("sheared", "aero", "Output")],
 )  # fmt: skip
 def test_nothing_depends_on_more_than_is_stated(fmu, probe, name, part, tag):
     file = fmu(name, "3", part)

@@ -78,6 +78,8 @@ def test_check_finds_nothing_and_references_are_met_to_the_last_bit(fmu, part, f
         ("spatial", "dynamics", "3"),
         ("spatial", "aero", "3"),
         ("two_link_gust", "aero", "3"),
+        ("sheared", "aero", "2"),
+        ("sheared", "aero", "3"),
         ("servo", "dynamics", "2"),
         ("servo", "dynamics", "3"),
     ],

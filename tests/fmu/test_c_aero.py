@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from linkwind.aero.plate import plate_table
 from linkwind.native.forces import Field, Plates
 from linkwind.scenario import load, loads
 from linkwind.spatial import Motion, Wrench
-from tests.fmu.c_model import DISCARD, ERROR, Instance, aero
+from tests.fmu.c_model import DISCARD, ERROR, Instance, aero, pointer
 from tests.fmu.test_c_derivatives import extrapolated
 
 OUTPUTS = ["FORCE", "TORQUE", "ADDED_INERTIA"]
@@ -59,14 +61,19 @@ GUSTS = (
     "environment.gusts=[{amplitude=[0.5,0.2,0],frequency=2,wavenumber=[0.3,0,0.2]},"
     "{shape='one_minus_cosine',amplitude=[0.5,0.2,0],frequency=2,wavenumber=[0.3,0,0],phase_deg=90}]"
 )
+POINTS = "[[0,1],[0.01,-2],[0.04,1]]"
 TABLE = "[[0,0,0.05,0],[10,0.8,0.1,0],[45,1,1,-0.25],[90,0,1.9,-0.475]]"
 WINGS = [
     f'bodies.link{i}.shape={{type="wing",points=[[{i},0],[0.5,1],[-0.2,0.7],[-0.1,-0.3]]}}' for i in (1, 2)
 ]
+WIND = [
+    f"environment.wind=['-5*(max(y,0.1)/10)**0.14 + sin(3*t)*z', {{table={POINTS},periodic=true}}, 0.5]",
+    "aero.plate.strips=2",
+]
 STRIPS = ["aero.plate.strips=3", "aero.plate.coefficients=table", f"aero.plate.table={TABLE}"]
 
 
-@pytest.fixture(scope="module", params=[[], STRIPS, STRIPS + WINGS[:1], WINGS])
+@pytest.fixture(scope="module", params=[[], STRIPS, STRIPS + WINGS[:1], WINGS, WIND])
 def plate(compiler, request):
     scenario = load("two_link", [GUSTS, *request.param])
     table = plate_table(scenario, scenario.providers[0])
@@ -98,6 +105,19 @@ def test_plate_bit_for_bit(plate):
         expected = [wrench.force, wrench.torque, wrench.added_inertia]
         assert fmu.get(*OUTPUTS).tobytes() == np.concatenate([part.ravel() for part in expected]).tobytes()
         fmu.step(k * 0.001, 0.001)
+    fmu.free()
+
+
+def test_a_wind_that_is_not_finite_is_told(compiler):
+    scenario = load("two_link", ["environment.wind.1=log(x + 0.5)"])
+    model = aero(plate_table(scenario, scenario.providers[0]))
+    fmu = Instance(compiler.library(model, 3, "blind"), model).initialize()
+    fmu.set("POSITION", [1.0, 2.0, 3.0, -1.0, 5.0, 6.0])
+    vrs, values = fmu.vrs("FORCE"), np.zeros(6)
+    size = ctypes.c_size_t
+    assert fmu.call("GetFloat64", pointer(vrs), size(len(vrs)), pointer(values), size(6)) == DISCARD
+    expected = "fmi3GetFloat64: Expected a finite wind along y on body 1 but was none at 0 s, (-1, 5, 6) m."
+    assert fmu.messages[-1][2] == expected
     fmu.free()
 
 

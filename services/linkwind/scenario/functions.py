@@ -9,7 +9,7 @@ from pydantic_core import CoreSchema
 
 from linkwind.scenario.points import Points, wrong
 from linkwind.scenario.problems import Problem, ProblemError, show
-from linkwind.scenario.quantities import Section, quantity, vector
+from linkwind.scenario.quantities import Section, numbers, quantity, vector
 from linkwind.scenario.translation import problems
 
 
@@ -81,17 +81,20 @@ def _components(value: Any) -> Any:
 
 
 def _component(value: Any, index: int) -> float | Function:
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        return vector((value, 0.0))[0]
     if isinstance(value, Function):
         return value
-    if not isinstance(value, str | dict):
+    if isinstance(value, bool) or not isinstance(value, int | float | str | dict):
+        expected = "a number, an expression or a table"
         advice = 'For example -5.0, "-5*(y/10)**0.14", or { table = "wind.csv" }.'
-        raise ProblemError([Problem((index,), "a number, an expression or a table", show(value), advice)])
+        raise ProblemError([Problem((index,), expected, show(value), advice)])
     try:
+        if isinstance(value, int | float):
+            return numbers(value, "numbers")[0]
         return Function.model_validate({"expression": value} if isinstance(value, str) else value)
     except ValidationError as error:
         raise ProblemError(problem.below((index,)) for problem in problems(error, Function)) from None
+    except ProblemError as error:
+        raise ProblemError(problem.below((index,)) for problem in error.problems) from None
 
 
 class _TwoOrThree:

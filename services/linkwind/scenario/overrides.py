@@ -7,15 +7,16 @@ from typing import Any
 
 from linkwind.scenario.problems import Path, Problem, ProblemError, choice, show
 
-# Where the scenario has lists of tables: a file may leave them out.
-TABLE_LISTS: tuple[Path, ...] = (
-    ("bodies",),
-    ("joints",),
-    ("events",),
-    ("forces",),
-    ("providers",),
-    ("environment", "gusts"),
-)
+# Lists that a file may leave out, and what they are then.
+LISTS: dict[Path, list[float]] = {
+    ("bodies",): [],
+    ("joints",): [],
+    ("events",): [],
+    ("forces",): [],
+    ("providers",): [],
+    ("environment", "gusts"): [],
+    ("environment", "wind"): [0.0, 0.0, 0.0],
+}
 
 
 def override(data: dict[str, Any], argument: str) -> Path:
@@ -41,7 +42,7 @@ def override(data: dict[str, Any], argument: str) -> Path:
         step = _entry(container, path, part)
         path = (*path, step)
         if isinstance(step, str):
-            container = container.setdefault(step, [] if path in TABLE_LISTS else {})
+            container = container.setdefault(step, list(LISTS[path]) if path in LISTS else {})
         else:
             container = container[step]
     last = _entry(container, path, parts[-1])
