@@ -251,6 +251,36 @@ def test_a_run_in_three_dimensions_has_the_third_component():
     np.testing.assert_allclose(air, np.sin(4 * np.pi * times)[:, None] * [1, 0, 0] - [1, 0, 0], atol=1e-6)
 
 
+def test_a_wind_that_changes_is_shown_as_it_is_at_the_bodies():
+    """The two links are equally heavy: their centre is the mean of their places."""
+    run = planar(200)
+    rows = [[0.0, 1.0], [0.6, 4.0], [1.2, 1.0]]
+    wind = [{"expression": "-2 + 0.5*y*t"}, {"table": rows}, 0.5]
+    environment = run.scenario["environment"] | {"wind": wind}
+    page = Page(render(dataclasses.replace(run, scenario=run.scenario | {"environment": environment})))
+    scene = page.data["scene"]
+    air, t = unpack(scene["air"]).reshape(-1, 3), run.trajectory.t
+    height = run.trajectory.position[:, :, 1].mean(axis=1)
+    expected = np.stack(
+        [-2.0 + 0.5 * height * t, np.interp(t, *np.transpose(rows)), np.full(201, 0.5)], axis=1
+    )
+    np.testing.assert_allclose(air, expected, atol=1e-6)
+    np.testing.assert_allclose(scene["wind"], expected.mean(axis=0), atol=1e-9)
+    assert "-2 + 0.5*y*t" in page.texts["td"]
+    steady = Page(render(run)).data["scene"]
+    assert (steady["wind"], steady["air"]) == ([-5.0, 0.0, 0.0], None)
+
+
+def test_a_wind_that_cannot_be_read_is_not_shown():
+    run = planar(20)
+    environment = run.scenario["environment"] | {"wind": [{"expression": HOSTILE}, 0.0, 0.0]}
+    scene = Page(render(dataclasses.replace(run, scenario=run.scenario | {"environment": environment}))).data[
+        "scene"
+    ]
+    assert scene["wind"] == [0.0, 0.0, 0.0]
+    assert np.isnan(unpack(scene["air"])).all()
+
+
 def test_what_stands_still_is_drawn_where_it_is():
     run = planar(5)
     floor = {"type": "box", "size": [4.0, 0.2, 2.0], "position": [1.0, -3.0, 0.0]}

@@ -11,6 +11,8 @@ SPINNER = """
 name = "spinner"
 [time]
 end = 0.2
+[environment]
+wind = ["20*t", 0, 0]
 [[bodies]]
 name = "arm"
 mass = 1.0

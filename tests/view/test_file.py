@@ -103,6 +103,8 @@ def test_a_mechanism_in_space_is_orbited(browser, logs):
         at_first = browser.evaluate(points)
         scrub(browser, 0.1)
         browser.until(f"{points} !== '{at_first}'")
+        words = browser.evaluate("space._fullLayout.annotations[0].text")
+        assert words.startswith("wind at the bodies 2 m/s along (2, 0, 0)")
         browser.mouse("mouseMoved", 400, 400)
         browser.mouse("mousePressed", 400, 400, 1)
         browser.mouse("mouseMoved", 500, 430, 1)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from linkwind.errors import LinkwindError
 from linkwind.native.wind import wind_at
 from linkwind.report.arrays import every_nth, pack
 from linkwind.report.data import Run
@@ -49,6 +50,8 @@ def scene(run: Run) -> dict[str, Any] | None:
 def _air(run: Run, t: Array, position: Array) -> Array | None:
     """Return the wind at the centre of mass of all [m/s], shape (k, 3); None where it is uniform and steady.
 
+    It is not a number where it cannot be told, because the log is not one of a run that was checked.
+
     Args:
         run: with the scenario.
         t: times [s], shape (k,).
@@ -59,7 +62,10 @@ def _air(run: Run, t: Array, position: Array) -> Array | None:
         return None
     mass = np.array([max(body["mass"], 1e-12) for body in run.scenario["bodies"]])[:, None]
     centre = (mass * position).sum(axis=1) / mass.sum()
-    table = wind_table(Environment.model_validate(stated), run.scenario["name"])
+    try:
+        table = wind_table(Environment.model_validate(stated), run.scenario["name"])
+    except (LinkwindError, ValueError):
+        return np.full(centre.shape, np.nan)
     return wind_at(table, t, centre, np.zeros(3))[0]
 
 

@@ -229,7 +229,8 @@ export function makeScene(canvas, motion, clock) {
     pen.fillStyle = colour("card");
     pen.globalAlpha = 0.82;
     pen.fillRect(0, camera.h - 44, camera.w, 26);
-    if (scene.air || windSpeed) pen.fillRect(0, 8, scene.air ? 240 : 200, 34);
+    const blows = isFinite(speed) && (scene.air || windSpeed);
+    if (blows) pen.fillRect(0, 8, scene.air ? 240 : 200, 34);
     pen.globalAlpha = 1;
     pen.textAlign = "left";
     pen.lineWidth = 2;
@@ -248,7 +249,7 @@ export function makeScene(canvas, motion, clock) {
       arrow(pen, [x, y - 3], [x + newton * unit, y - 3], 11);
       pen.fillText(`${number(newton)} N${camera.w < 440 ? "" : " aerodynamic force"}`, x + newton * unit + 7, y + 1);
     }
-    if (scene.air || windSpeed) {
+    if (blows) {
       const along = camera.turn(wind).map((part) => part / speed * 46);
       pen.strokeStyle = pen.fillStyle = colour("wind");
       arrow(pen, [38 - along[0] / 2, 26 + along[1] / 2], [38 + along[0] / 2, 26 - along[1] / 2], 11);

@@ -214,7 +214,7 @@ export function makeSpace(host, motion, clock) {
   }
 
   function words() {
-    const wind = motion.air(clock.t), where = scene.air ? " at the bodies" : "", blows = scene.air || length(wind);
+    const wind = motion.air(clock.t), where = scene.air ? " at the bodies" : "", blows = isFinite(length(wind)) && (scene.air || length(wind));
     const text = blows ? [`wind${where} ${number(length(wind))} m/s along (${wind.map(number).join(", ")})`] : [];
     if (motion.largest) text.push(`longest arrow ${number(motion.largest)} N`);
     return [{ text: text.join(" · "), x: 0.01, y: 0.99, xref: "paper", yref: "paper", xanchor: "left", yanchor: "top", showarrow: false }];
