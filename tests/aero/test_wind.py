@@ -133,6 +133,29 @@ def test_one_component_at_the_command_line(before: str) -> None:
     assert changed.uniform_wind[1:] == ((2.0, 0.0) if "wind" in before else (0.0, 0.0))
 
 
+def test_the_winds_of_the_guide(tmp_path: Path) -> None:
+    guide = (Path(__file__).parents[2] / "services" / "guide" / "mechanisms.md").read_text(encoding="utf-8")
+    section = guide.partition("\n## Wind\n")[2].partition("\n## ")[0]
+    stated = [line.strip() for line in section.splitlines() if line.startswith("    wind = [")]
+    (tmp_path / "wind.csv").write_text("0, 3\n1, 4\n")
+    places = np.stack(np.meshgrid([-7.0, 0.0, 3.0], [-1.0, 0.0, 20.0], [0.0, 5.0]), axis=-1).reshape(-1, 3)
+    found = []
+    for number, line in enumerate(stated):
+        file = tmp_path / f"{number}.toml"
+        file.write_text(f"{PLATE}\n[environment]\n{line}\n")
+        air = linkwind.Wind(linkwind.load(file))
+        assert np.isfinite(air.rate(0.5, places, places)).all()
+        found.append(air.velocity(0.5, places))
+    assert len({each.tobytes() for each in found}) == len(found) == 6
+    # The vortex: on a circle around its centre the air turns with one speed, 2 m/s at the most, where r is the core.
+    angle = np.linspace(0.0, 6.0, 9)[:, None]
+    around = np.hstack([np.cos(angle), np.sin(angle), 0.0 * angle])
+    for radius, fastest in ((0.1, 1.6), (0.2, 2.0), (0.4, 1.6)):
+        own = air.velocity(2.0, [6.0, 0.0, 0.0] + radius * around) - [3.0, 0.0, 0.0]
+        np.testing.assert_allclose(np.linalg.norm(own, axis=1), fastest, rtol=1e-12)
+        np.testing.assert_allclose((own * around).sum(axis=1), 0.0, atol=1e-12)
+
+
 # ---- bodies in it ----
 
 ACROSS = """

@@ -7,7 +7,7 @@ from html import escape
 from linkwind.fmi.coordinates import force_names
 from linkwind.fmi.part import Part
 from linkwind.fmi.variables import Variable
-from linkwind.scenario import Provider
+from linkwind.scenario import Environment, Provider
 from linkwind.scenario.functions import Function
 
 _STYLE = """
@@ -87,7 +87,7 @@ def index(part: Part, picture: str, *, has_references: bool) -> bytes:
     equations = (
         _DYNAMICS + _forces(part)
         if provider is None
-        else _plate(provider)
+        else _plate(provider) + _wind(part.scenario.environment)
         if provider.model == "plate"
         else _field(part)
     )
@@ -132,6 +132,17 @@ integrator.</p>
 </body></html>
 """
     return text.encode()
+
+
+def _wind(environment: Environment) -> str:
+    """The wind that plates meet, as the scenario states it."""
+    functions = [
+        f"<code>{escape(_law(function))}</code> along {'xyz'[i]}"
+        for i, function in environment.wind_functions.items()
+    ]
+    stated = f", functions of time t and place x y z, {', '.join(functions)}" if functions else ""
+    gusts = f", and {len(environment.gusts)} travelling gusts" if environment.gusts else ""
+    return f"<p>The wind is the sum of the parameter <code>wind</code>{stated}{gusts}.</p>"
 
 
 def _plate(provider: Provider) -> str:
