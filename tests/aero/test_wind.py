@@ -147,7 +147,7 @@ def test_the_winds_of_the_guide(tmp_path: Path) -> None:
         assert np.isfinite(air.rate(0.5, places, places)).all()
         found.append(air.velocity(0.5, places))
     assert len({each.tobytes() for each in found}) == len(found) == 6
-    # The vortex: on circles around its centre the air turns with one speed, 2 m/s at most, where the core ends.
+    # The vortex: on circles around its centre the air turns with one speed, 2 m/s at most, at its core.
     angle = np.linspace(0.0, 6.0, 9)[:, None]
     around = np.hstack([np.cos(angle), np.sin(angle), 0.0 * angle])
     for radius, fastest in ((0.1, 1.6), (0.2, 2.0), (0.4, 1.6)):
