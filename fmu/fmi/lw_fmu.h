@@ -30,10 +30,11 @@
     X(FORCE_EFFORT, lw_fmu_forces) X(FORCE_POWER, lw_fmu_forces)                                         \
     X(KINETIC_ENERGY, 1) X(POTENTIAL_ENERGY, 1)
 
-/* A field leaves density, wind, length and span unused (no variable refers to them). */
+/* A field leaves density, wind, its inputs, length and span unused (no variable refers to them). */
 #define LW_AERO_KNOWN(X)                                                                                 \
     X(DENSITY, 1) X(WIND, 3) X(LENGTH, n) X(SPAN, n)                                                     \
-    X(POSITION, 3 * n) X(ORIENTATION, 4 * n) X(LINEAR, 3 * n) X(ANGULAR, 3 * n)
+    X(POSITION, 3 * n) X(ORIENTATION, 4 * n) X(LINEAR, 3 * n) X(ANGULAR, 3 * n)                          \
+    X(WIND_INPUT, lw_fmu_wind_inputs)
 #define LW_AERO_CALCULATED(X) X(FORCE, 3 * n) X(TORQUE, 3 * n) X(ADDED_INERTIA, 36 * n)
 
 /* A section's number counts from 0 within its part: LW_DYNAMICS_MASS = 0 ..., LW_AERO_DENSITY = 0 ... */
@@ -100,7 +101,8 @@ extern const int32_t lw_fmu_gust_count;
 extern const double lw_fmu_gusts[];       /* (gust_count, 9) as lw_wind.h */
 extern const int32_t lw_fmu_wind_instructions;
 extern const int32_t lw_fmu_wind_code[];  /* (wind_instructions, 2) as lw_wind.h */
-extern const double lw_fmu_wind_constants[];
+extern const double lw_fmu_wind_constants[]; /* (wind_constant_count), the first wind_inputs of them inputs */
+extern const int32_t lw_fmu_wind_constant_count, lw_fmu_wind_inputs;
 extern const int32_t lw_fmu_field_start[]; /* (n + 1) as lw_field.h; the bodies are 0 ... n - 1 */
 extern const int32_t lw_fmu_field_code[];
 extern const double lw_fmu_field_constants[];

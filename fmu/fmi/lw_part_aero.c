@@ -13,6 +13,7 @@ struct lw_part {
     lw_plates plates;
     lw_field field;
     double *size;  /* (n, 2) chord, of a wing the mean one, and span [m] */
+    double *wind;  /* (wind_constant_count) constants of the wind's functions */
     int32_t *body; /* (n) 0 ... n - 1 */
 };
 
@@ -43,7 +44,9 @@ size_t lw_part_memory(void) { return (size_t)lw_fmu_n; }
 
 static size_t own_size(void) { return (sizeof(lw_part) + 7) / 8 * 8; }
 
-size_t lw_part_size(void) { return own_size() + (size_t)lw_fmu_n * (2 * sizeof(double) + sizeof(double)); }
+size_t lw_part_size(void) {
+    return own_size() + (size_t)(lw_fmu_n * 3 + lw_fmu_wind_constant_count) * sizeof(double);
+}
 
 void lw_part_create(lw_instance *instance) {
     lw_part *part = instance->part;
@@ -53,7 +56,8 @@ void lw_part_create(lw_instance *instance) {
     LW_AERO_KNOWN(PLACE) LW_AERO_CALCULATED(PLACE)
     *first = count;
     part->size = (double *)(void *)((char *)part + own_size());
-    part->body = (int32_t *)(void *)(part->size + 2 * n);
+    part->wind = part->size + 2 * n;
+    part->body = (int32_t *)(void *)(part->wind + lw_fmu_wind_constant_count);
     for (int32_t i = 0; i < n; ++i) part->body[i] = i;
     part->field.n = part->plates.n = n;
     part->field.body = part->plates.body = part->body;
@@ -70,7 +74,8 @@ void lw_part_create(lw_instance *instance) {
     part->plates.wind.gusts = lw_fmu_gusts;
     part->plates.wind.instructions = lw_fmu_wind_instructions;
     part->plates.wind.code = lw_fmu_wind_code;
-    part->plates.wind.constants = lw_fmu_wind_constants;
+    part->plates.wind.constants = part->wind;
+    memcpy(part->wind, lw_fmu_wind_constants, (size_t)lw_fmu_wind_constant_count * sizeof(double));
 }
 
 void lw_part_restart(lw_instance *instance) {
@@ -146,6 +151,7 @@ int lw_part_update(lw_instance *instance, unsigned groups) {
     lw_wrench wrench = {AT(FORCE), AT(TORQUE), AT(ADDED_INERTIA)};
     int field = lw_fmu_aero_model == LW_AERO_FIELD;
     (void)groups;
+    memcpy(part->wind, AT(WIND_INPUT), (size_t)lw_fmu_wind_inputs * sizeof(double));
     int status = field ? lw_field_evaluate(&part->field, instance->time, &now, instance->store, &wrench)
                        : lw_plates_evaluate(&part->plates, instance->time, &now, &wrench);
     if (!status) return LW_FMI_OK;

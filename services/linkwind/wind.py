@@ -44,13 +44,20 @@ def wind_table(environment: Environment, source: str) -> WindTable:
         f"{source}: environment",
         variables=VARIABLES,
         components=COMPONENTS,
+        inputs=inputs(environment),
     )
     return WindTable(
         uniform=np.array(environment.uniform_wind),
         gusts=np.array(gusts, dtype=np.float64).reshape(-1, 9),
         code=np.array(program.code, dtype=np.int32).reshape(-1, 2),
         constants=np.array(program.constants, dtype=np.float64),
+        inputs=program.inputs,
     )
+
+
+def inputs(environment: Environment) -> dict[str, float]:
+    """Return the inputs of the wind with their values, in the order of the table's constants."""
+    return dict(sorted((environment.inputs or {}).items()))
 
 
 class Wind:

@@ -126,6 +126,21 @@ def test_functions_survive_json() -> None:
     assert scenario.environment.uniform_wind == (0.0, 0.0, 0.0)
 
 
+def test_inputs_are_numbers_that_expressions_use() -> None:
+    stated = ["environment.wind=['u + w*t', 0, 0]", "environment.inputs={ w = 2.0, u = 1 }"]
+    assert wind(*stated).velocity(3.0, np.zeros(3)).tolist() == [7.0, 0.0, 0.0]
+    assert wind(*stated, "environment.inputs.u=-1").velocity(3.0, np.zeros(3)).tolist() == [5.0, 0.0, 0.0]
+    assert "inputs" not in json.loads(loads(PLATE, "scene").to_json())["environment"]
+    with pytest.raises(
+        ExpressionError, match=r'environment\.inputs: expected names that .* got "u", which none'
+    ):
+        wind("environment.inputs={ u = 1.0 }")
+    with pytest.raises(
+        ExpressionError, match=r'environment\.inputs: expected a name that is not taken; got "t"'
+    ):
+        wind("environment.wind=['t', 0, 0]", "environment.inputs={ t = 1.0 }")
+
+
 @pytest.mark.parametrize("before", ["environment.gravity=[0,0,0]", "environment.wind=[1,2]"])
 def test_one_component_at_the_command_line(before: str) -> None:
     changed = loads(PLATE, "scene", [before, f"environment.wind.0={SHEAR}"]).environment

@@ -317,5 +317,5 @@ def servo() -> Scenario:
 
 def sheared() -> Scenario:
     """Two plates in a wind of which each component is of another kind."""
-    wind = "['-5*(max(y, 0.1)/10)**0.14', { table = [[0, 1], [0.05, 2], [0.1, 1]], periodic = true }, 0.5]"
-    return load("two_link", [f"environment.wind={wind}", "aero.plate.strips=2"])
+    wind = "['-5*(max(y, 0.1)/10)**0.14', { table = [[0, 1], [0.05, 2], [0.1, 1]], periodic = true }, 'u']"
+    return load("two_link", [f"environment.wind={wind}", "environment.inputs.u=0.5", "aero.plate.strips=2"])

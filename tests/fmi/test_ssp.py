@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from linkwind.cli import app
 from linkwind.errors import InputError
 from linkwind.fmi.ssp import export_system
-from linkwind.scenario import Scenario, loads
+from linkwind.scenario import Scenario, load, loads
 from tests.fmi.conftest import scenario
 from tests.fmi.scenes import SERVO
 from tests.fmi.test_trajectories import STEPS, H, explicit_run, poses  # noqa: F401
@@ -62,6 +62,18 @@ def test_equal_names_of_mechanism_and_force_model_are_connected(system):
     forces = {name for start, name, end, _ in inner if (start, end) == ("aero", "dynamics")}
     assert len(forces) == 2 * (3 + 3 + 36)
     assert {"link1.F[1]", "link2.T[3]", "link2.A[6,6]"} <= forces
+
+
+def test_an_input_of_the_wind_is_one_of_the_system(uncompiled, tmp_path):
+    """It goes to each model of plates; motion and forces are connected as ever."""
+    settings = ["environment.wind=['u', 0, 0]", "environment.inputs.u=-4"]
+    file = export_system(load("two_link", settings), tmp_path / "blown.ssp").file
+    outer = [link for link in ends(file) if link[0] is None]
+    assert outer == [(None, "environment.u", "aero", "environment.u")]
+    parsed = read_ssd(str(file)).system
+    assert [c.name for c in parsed.connectors if c.kind == "input"] == ["environment.u"]
+    (values,) = parsed.parameterBindings[0].parameterValues
+    assert [(p.name, p.value) for p in values.parameters] == [("environment.u", "-4.0")]
 
 
 def test_every_input_is_connected_once_and_types_and_units_come_along(system):

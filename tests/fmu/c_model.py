@@ -44,7 +44,7 @@ KNOWN = {
 }
 INPUTS = {
     "dynamics": {"FORCE", "TORQUE", "FORCE_INPUT", "ADDED_INERTIA"},
-    "aero": {"POSITION", "ORIENTATION", "LINEAR", "ANGULAR"},
+    "aero": {"POSITION", "ORIENTATION", "LINEAR", "ANGULAR", "WIND_INPUT"},
 }
 INTEGERS = (
     "closure_body", "closure_rows", "event_joint", "event_action", "event_occasion", "event_side",
@@ -185,6 +185,7 @@ def aero(table: PlateTable | FieldTable, theta=(), *, scalar=False) -> Model:
         "ORIENTATION": 4 * n,
         "LINEAR": 3 * n,
         "ANGULAR": 3 * n,
+        "WIND_INPUT": table.wind.inputs if plate else 0,
         "FORCE": 3 * n,
         "TORQUE": 3 * n,
         "ADDED_INERTIA": 36 * n,
@@ -193,6 +194,7 @@ def aero(table: PlateTable | FieldTable, theta=(), *, scalar=False) -> Model:
     gusts, field, coefficients, strips, curves = np.zeros((0, 9)), [[0], [0], [0.0]], 0, 0, np.zeros((3, 0))
     if plate:
         start |= {"DENSITY": table.density, "WIND": table.wind.uniform}
+        start |= {"WIND_INPUT": table.wind.constants[: table.wind.inputs]}
         start |= {"LENGTH": table.size[:, 0], "SPAN": table.size[:, 1]}
         gusts, coefficients = table.wind.gusts, int(table.coefficients)
         strips, curves = table.strips, table.curves
@@ -212,6 +214,8 @@ def aero(table: PlateTable | FieldTable, theta=(), *, scalar=False) -> Model:
     constants += f"const int32_t lw_fmu_wind_instructions = {len(wind.code)};\n"
     constants += _array("int32_t", "wind_code", wind.code if len(wind.code) else [0])
     constants += _array("double", "wind_constants", wind.constants if len(wind.constants) else [0.0])
+    count = len(wind.constants)
+    constants += f"const int32_t lw_fmu_wind_constant_count = {count}, lw_fmu_wind_inputs = {wind.inputs};\n"
     constants += _array("int32_t", "field_start", field[0]) + _array("int32_t", "field_code", field[1])
     constants += _array("double", "field_constants", field[2])
     constants += _array("double", "theta", theta if len(theta) else np.zeros(n))

@@ -108,6 +108,36 @@ def test_plate_bit_for_bit(plate):
     fmu.free()
 
 
+def test_an_input_of_the_wind_is_the_constant_of_the_scenario(compiler):
+    """What another tool sets between steps: the library's bits with the same number in the scenario."""
+
+    def table(u):
+        settings = ["environment.wind=['u*(max(y,0.1)/10)**0.14', 'w*t - u', 3]", "time.end=1.0"]
+        scenario = load("two_link", [*settings, f"environment.inputs={{ w = 0.5, u = {u!r} }}"])
+        return plate_table(scenario, scenario.providers[0])
+
+    model = aero(table(-5.0))
+    fmu = Instance(compiler.library(model, 3, "blown"), model).initialize()
+    assert fmu.get("WIND_INPUT").tolist() == [-5.0, 0.5]
+    wrench = Wrench.zeros(2)
+    for k, motion in enumerate(motions(2, 20)):
+        u = -5.0 if k < 5 else 0.3 * k
+        set_motion(fmu, motion)
+        if k >= 5:
+            fmu.set("WIND_INPUT", [u, 0.5])
+        Plates(table(u)).evaluate(fmu.get_time(), motion, wrench)
+        expected = np.concatenate([wrench.force.ravel(), wrench.torque.ravel()])
+        assert fmu.get("FORCE", "TORQUE").tobytes() == expected.tobytes()
+        fmu.step(k * 0.001, 0.001)
+    by_input = fmu.derivative("Directional", ["FORCE"], ["WIND_INPUT"], [1.0, 0.0])
+    lower, upper = Wrench.zeros(2), Wrench.zeros(2)
+    for side, out in ((-1e-6, lower), (1e-6, upper)):
+        Plates(table(u + side)).evaluate(fmu.get_time(), motion, out)
+    difference = (upper.force - lower.force).ravel() / 2e-6
+    np.testing.assert_allclose(by_input, difference, rtol=1e-5, atol=1e-5 * abs(difference).max())
+    fmu.free()
+
+
 def test_a_wind_that_is_not_finite_is_told(compiler):
     scenario = load("two_link", ["environment.wind.1=log(x + 0.5)"])
     model = aero(plate_table(scenario, scenario.providers[0]))

@@ -46,7 +46,7 @@ class Seldom:
         can = self._model.capabilities
         if can.response_size:
             raise InputError(
-                f'{item(scenario, provider, "every")}: expected 1 for a model that returns the response to '
+                f"{item(scenario, provider, 'every')}: expected 1 for a model that returns the response to "
                 f"the twist at the end of the step; got {provider.every}. Leave it out; take a larger "
                 "coupling.step, with dynamics.substeps."
             )

@@ -20,7 +20,7 @@ from linkwind.native.multibody import Multibody
 from linkwind.native.wind import VARIABLES as WIND_VARIABLES
 from linkwind.scenario import Provider, Scenario
 from linkwind.spatial import Motion
-from linkwind.wind import wind_table
+from linkwind.wind import inputs, wind_table
 
 # What length and span are, by the type of the shape.
 _SIDES = {
@@ -52,6 +52,7 @@ def variables(scenario: Scenario, provider: Provider, mechanism: Mechanism) -> l
     return [
         TIME,
         *_inputs(provider, mechanism),
+        *_wind_inputs(scenario, provider),
         *_outputs(scenario, provider),
         *_parameters(scenario, provider),
     ]
@@ -72,6 +73,19 @@ def _inputs(provider: Provider, mechanism: Mechanism) -> Iterator[Variable]:
         ):  # fmt: skip
             size = len(start)
             yield vector_input(f"{body}.{what}", section, size * i, start, quantity, about.format(body))
+
+
+def wind_inputs(scenario: Scenario, provider: Provider) -> dict[str, float]:
+    """Return the inputs of the wind that a model meets, by the names of their variables, and their values."""
+    stated = inputs(scenario.environment) if provider.model == "plate" else {}
+    return {f"environment.{name}": value for name, value in stated.items()}
+
+
+def _wind_inputs(scenario: Scenario, provider: Provider) -> Iterator[Variable]:
+    for at, (name, start) in enumerate(wind_inputs(scenario, provider).items()):
+        yield Variable(
+            name, "WIND_INPUT", at, (), "input", "continuous", "", units.INPUT, "Input of the wind", (start,)
+        )
 
 
 def _outputs(scenario: Scenario, provider: Provider) -> Iterator[Variable]:
@@ -108,8 +122,10 @@ def _plates_read(scenario: Scenario, provider: Provider) -> list[Dependences]:
     time = ("time",) if gusty or "t" in pushed else ()
     place = ("r",) if gusty or pushed & {"x", "y", "z"} else ()
     whats = (*place, "orientation", "v", "w")
+    given = tuple(wind_inputs(scenario, provider))
     return [
-        tuple(map(Dependence, (*time, *(f"{body}.{what}" for what in whats)))) for body in provider.bodies
+        tuple(map(Dependence, (*time, *(f"{body}.{what}" for what in whats), *given)))
+        for body in provider.bodies
     ]
 
 

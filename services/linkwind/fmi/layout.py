@@ -36,11 +36,12 @@ def dynamics_sections(
     return known | calculated
 
 
-def aero_sections(n: int) -> dict[str, int]:
+def aero_sections(n: int, wind_inputs: int) -> dict[str, int]:
     """Return the size of each section of a force FMU, in order, for n bodies."""
     return {
         "DENSITY": 1, "WIND": 3, "LENGTH": n, "SPAN": n,
         "POSITION": 3 * n, "ORIENTATION": 4 * n, "LINEAR": 3 * n, "ANGULAR": 3 * n,
+        "WIND_INPUT": wind_inputs,
         "FORCE": 3 * n, "TORQUE": 3 * n, "ADDED_INERTIA": 36 * n,
     }  # fmt: skip
 

@@ -17,7 +17,7 @@ from linkwind.fmi import aero, dynamics
 from linkwind.fmi.layout import aero_sections, dynamics_sections, starts
 from linkwind.fmi.variables import Variable, scalars
 from linkwind.mechanism import Mechanism, build
-from linkwind.scenario import Provider, Scenario
+from linkwind.scenario import Environment, Provider, Scenario
 from linkwind.spatial import Array
 from linkwind.wind import wind_table
 
@@ -169,20 +169,23 @@ def provider_part(scenario: Scenario, provider: Provider, *, native_arrays: bool
     return Part(
         "aero", scenario, mechanism, provider,
         variables if native_arrays else scalars(variables),
-        aero_sections(n),
+        aero_sections(n, len(aero.wind_inputs(scenario, provider))),
         (0, 0),
         tables | _plate_constants(scenario, provider) | _field_constants(scenario, provider),
     )  # fmt: skip
 
 
 def _plate_constants(scenario: Scenario, provider: Provider) -> dict[str, Table]:
-    table = wind_table(scenario.environment, scenario.source)
+    environment = scenario.environment if provider.model == "plate" else Environment()
+    table = wind_table(environment, scenario.source)
     wind: dict[str, Table] = {
         "gust_count": len(table.gusts),
         "gusts": table.gusts,
         "wind_instructions": len(table.code),
         "wind_code": table.code,
         "wind_constants": table.constants,
+        "wind_constant_count": len(table.constants),
+        "wind_inputs": table.inputs,
     }
     if provider.model != "plate":
         return {

@@ -14,6 +14,7 @@ import numpy as np
 
 from linkwind import aero
 from linkwind.errors import SimulationError
+from linkwind.fmi.aero import wind_inputs
 from linkwind.fmi.description import to_bytes
 from linkwind.fmi.part import Part
 from linkwind.fmi.variables import Variable
@@ -104,11 +105,13 @@ def _aero(part: Part) -> tuple[Rows, Rows]:
     motion = Motion.at_rest(multibody.n)
     wrench = Wrench.zeros(len(provider.bodies))
     which = [mechanism.bodies.index(body) for body in provider.bodies]
+    blown = np.array(list(wind_inputs(part.scenario, provider).values()))
     inputs: Rows = []
     results: Rows = []
     for k in range(STEPS):
         _move(motion, start, k, planar=part.scenario.planar)
-        inputs.append(_flat({name: rows[which] for name, rows in _motion_sections(motion).items()}))
+        moved = _flat({name: rows[which] for name, rows in _motion_sections(motion).items()})
+        inputs.append(moved | {"WIND_INPUT": blown})
         t = k * part.step + part.step  # the FMU's: communication point and step size added
         model.evaluate(t, motion, wrench)
         model.commit(t, motion)

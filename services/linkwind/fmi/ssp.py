@@ -3,8 +3,8 @@
 https://ssp-standard.org/publications/SSP10/SystemStructureAndParameterization10.pdf: a zip file with
 ``SystemStructure.ssd`` and the FMUs. The mechanism's FMU is the element ``dynamics``, a force model's is
 named like its provider; what has the same name on both sides is connected, as the terminals of FMI 3 are.
-Inputs of the mechanism that no force model gives are inputs of the system, with the values that they have in
-a run, and all that the mechanism tells are its outputs. Where there are none the system is closed: it has no
+Inputs of the mechanism that no force model gives, and those of the wind, are inputs of the system, with the values
+that they have in a run, and all that the mechanism tells are its outputs. Where there are none the system is closed: it has no
 connectors of its own, which some tools cannot read.
 """
 
@@ -103,11 +103,14 @@ def structure(parts: dict[str, Part]) -> bytes:
     about = f"Forces held over communication steps, of {mechanism.step!r} s in the scenario"
     system = _child(root, "System", name=identifier, description=about)
     inner = list(_inner(parts))
-    inputs = _open_inputs(mechanism, {name for _, _, end, name in inner if end == DYNAMICS})
+    left = _open_inputs(mechanism, {name for _, _, end, name in inner if end == DYNAMICS})
+    blown = [(name, v) for name, part in parts.items() for v in part.variables if v.section == "WIND_INPUT"]
+    inputs = [*left, *{v.name: v for _, v in blown}.values()]
     outputs = [v for v in mechanism.variables if v.causality == "output"] if inputs else []
     links = [
         *inner,
-        *((None, v.name, DYNAMICS, v.name) for v in inputs),
+        *((None, v.name, DYNAMICS, v.name) for v in left),
+        *((None, v.name, name, v.name) for name, v in blown),
         *((DYNAMICS, v.name, None, v.name) for v in outputs),
     ]
     if inputs:
@@ -138,7 +141,8 @@ def _inner(parts: dict[str, Part]) -> Iterator[Link]:
     """Yield the connections between mechanism and force models: all motion, then all forces."""
     models = [(name, part) for name, part in parts.items() if name != DYNAMICS]
     for name, part in models:
-        yield from ((DYNAMICS, v.name, name, v.name) for v in part.variables if v.causality == "input")
+        moved = (v.name for v in part.variables if v.causality == "input" and v.section != "WIND_INPUT")
+        yield from ((DYNAMICS, motion, name, motion) for motion in moved)
     for name, part in models:
         yield from ((name, v.name, DYNAMICS, v.name) for v in part.variables if v.causality == "output")
 

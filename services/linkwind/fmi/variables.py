@@ -46,7 +46,8 @@ Exchange the event indicator ``separation.indicator``; one on command has the Bo
 inputs by the names that the scenario gives them: ``motor.u``.
 
 Further names: ``time``, ``gravity``, ``kinetic_energy``, ``potential_energy``, ``solver.integrator``,
-``solver.substeps``, ``solver.rtol``, ``solver.atol``; in the force FMU ``density`` and ``wind``.
+``solver.substeps``, ``solver.rtol``, ``solver.atol``; in the force FMU ``density``, ``wind``, and
+the wind's inputs by the names that the scenario gives them: ``environment.u``.
 
 In FMI 2, and with scalar arrays, elements are variables of their own: ``link1.F[1]``, ``link1.A[1,6]``,
 ``der(hinge.v[2])``.

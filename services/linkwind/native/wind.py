@@ -27,12 +27,14 @@ class WindTable:
         code: operation and operand of each instruction of the program whose results 0, 1, 2 are u along x, y
             and z, and whose variables are ``VARIABLES``, shape (m, 2).
         constants: what its instructions push, shape (any,).
+        inputs: how many of the constants, the first ones, are inputs.
     """
 
     uniform: Array
     gusts: Array
     code: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 2), np.int32))
     constants: Array = field(default_factory=lambda: np.zeros(0))
+    inputs: int = 0
 
 
 class WindStruct(ctypes.Structure):

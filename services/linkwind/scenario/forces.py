@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, WithJsonSchema
+from pydantic import Field
 
-from linkwind.scenario.functions import AnyFunction, AnyMotion
+from linkwind.scenario.functions import AnyFunction, AnyMotion, Inputs
 from linkwind.scenario.providers import Definitions
 from linkwind.scenario.quantities import Name, Section, Vector, quantity
 
 _NAME = "Name, a letter followed by letters, digits and _"
 _INPUTS = "Names that the expressions may use, and their values, which the FMU takes as inputs"
 _COORDINATE = "Number of the joint's coordinate; of a planar joint 0 is x, 1 y, 2 the angle"
-
-Inputs = Annotated[
-    dict[Name, float],
-    WithJsonSchema({"type": "object", "additionalProperties": {"type": "number"}}),
-]
 
 
 class Spring(Section):

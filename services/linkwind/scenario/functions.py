@@ -4,12 +4,19 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, ValidationError, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    GetJsonSchemaHandler,
+    ValidationError,
+    WithJsonSchema,
+    model_validator,
+)
 from pydantic_core import CoreSchema
 
 from linkwind.scenario.points import Points, wrong
 from linkwind.scenario.problems import Problem, ProblemError, show
-from linkwind.scenario.quantities import Section, numbers, quantity, vector
+from linkwind.scenario.quantities import Name, Section, numbers, quantity, vector
 from linkwind.scenario.translation import problems
 
 
@@ -112,3 +119,9 @@ AnyMotion = Annotated[Function, BeforeValidator(_motion)]
 Component = float | Function
 Components = Annotated[tuple[Component, Component, Component], BeforeValidator(_components), _TwoOrThree()]
 """Three components of a vector, each a number or a function; two are padded with z = 0."""
+
+Inputs = Annotated[
+    dict[Name, float],
+    WithJsonSchema({"type": "object", "additionalProperties": {"type": "number"}}),
+]
+"""Names that expressions may use, and their values."""

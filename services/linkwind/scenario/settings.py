@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field, field_validator
 
-from linkwind.scenario.functions import Components, Function
+from linkwind.scenario.functions import Components, Function, Inputs
 from linkwind.scenario.pictures import Pictures
 from linkwind.scenario.problems import ProblemError
 from linkwind.scenario.quantities import Section, Vector, Vector3, quantity
@@ -61,6 +61,12 @@ class Environment(Section):
         "and z, or a table over t",
         "m/s",
         ZERO,
+    )
+    inputs: Inputs | None = quantity(
+        "Names that the expressions of the wind may use, and their values, which the FMU of plates takes as "
+        "inputs",
+        "any unit",
+        None,
     )
     gusts: tuple[Gust, ...] = Field(
         default=(), strict=False, description="Waves that travel through the wind"
