@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from linkwind.native import forces
+from linkwind.native import wind as winds
 from linkwind.native.expressions import LOCALS_SIZE, STACK_SIZE, Operation
 from linkwind.native.forces import (
     Coefficients,
@@ -43,6 +44,12 @@ def test_operations_variables_and_limits_are_those_of_the_c_header():
     assert operations == {f"LW_{op.name}": op.value for op in Operation}
     assert list(variables) == [f"LW_VAR_{name.upper()}" for name in forces.VARIABLES] + ["LW_VARIABLES"]
     assert limits == {"LW_EXPRESSION_STACK": STACK_SIZE, "LW_EXPRESSION_LOCALS": LOCALS_SIZE}
+
+
+def test_shapes_of_gusts_and_variables_of_winds_are_those_of_the_c_header():
+    _, shapes, variables = enumerations("lw_wind.h")
+    assert shapes == {f"LW_{name.upper()}": value for name, value in winds.GUST_SHAPES.items()}
+    assert list(variables) == [f"LW_WIND_{name.upper()}" for name in (*winds.VARIABLES, "variables")]
 
 
 def test_coefficient_sets_are_those_of_the_c_header():

@@ -3,9 +3,9 @@
 https://ssp-standard.org/publications/SSP10/SystemStructureAndParameterization10.pdf: a zip file with
 ``SystemStructure.ssd`` and the FMUs. The mechanism's FMU is the element ``dynamics``, a force model's is
 named like its provider; what has the same name on both sides is connected, as the terminals of FMI 3 are.
-Inputs of the mechanism that no force model gives, and those of the wind, are inputs of the system, with the values
-that they have in a run, and all that the mechanism tells are its outputs. Where there are none the system is closed: it has no
-connectors of its own, which some tools cannot read.
+Inputs of the mechanism that no force model gives, and those of the wind, are inputs of the system, with the
+values that they have in a run, and all that the mechanism tells are its outputs. Where there are none the
+system is closed: it has no connectors of its own, which some tools cannot read.
 """
 
 from __future__ import annotations
