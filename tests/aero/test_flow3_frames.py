@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from linkwind.aero.flow.drift import Frame
 from linkwind.frames import VolumeFrame
 from tests.aero.flows3 import BALL, CELLS, HEAVY, PLATE, SIDE, STEP, WIND, driven, motion, steady, still
 
@@ -68,7 +69,7 @@ def test_half_the_lattice_step_shows_the_same():
     long = driven(EACH, f"time.end={200 * STEP!r}", shape=PLATE)
     frame, _ = shown(long, still(), 60)
     long.model.fluid.halve(1e-2)
-    half = long.model.fluid.picture(1.0, 60, frame.time_ns)
+    half = long.model.fluid.picture(1.0, 60, frame.time_ns, Frame(np.zeros(3), np.zeros(3)))
     speed = np.linalg.norm(WIND)
     np.testing.assert_allclose(half.velocity, frame.velocity, atol=1e-5 * speed)
     np.testing.assert_allclose(half.pressure, frame.pressure, atol=1e-3 * speed**2)

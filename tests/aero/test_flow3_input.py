@@ -100,12 +100,6 @@ def test_a_body_with_too_few_cells_along_it():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        (["environment.gusts=[{ amplitude = [1.0, 0.0], frequency = 1.0 }]"],
-         "environment.gusts: expected none: the model flow has a uniform wind; got 1 of them"),
-        (["environment.wind=[1.0, 'sin(t)']"],
-         'environment.wind[1]: expected a number: the model flow has a uniform and steady wind; got "sin('),
-        (["environment.wind=[1.0, 0.0, { table = [[0, 1], [1, 2]] }]"],
-         "environment.wind[2]: expected a number: the model flow has a uniform and steady wind; got a tab"),
         (["environment.density=0.0"], "environment.density: expected a number above 0 for the model flow"),
         (["providers.0.flow.window=[4.8, 4.8]"],
          "flow.window: expected 3 lengths, as many as dimensions; got [4.8, 4.8]. Write [width, height,"),

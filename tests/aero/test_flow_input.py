@@ -47,12 +47,6 @@ def test_what_is_refused_before_the_start(changes, message):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        (["environment.gusts=[{ amplitude = [1.0, 0.0], frequency = 1.0 }]"],
-         "environment.gusts: expected none: the model flow has a uniform wind; got 1 of them"),
-        (["environment.wind=[1.0, 'sin(t)']"],
-         'environment.wind[1]: expected a number: the model flow has a uniform and steady wind; got "sin('),
-        (["environment.wind=[1.0, 0.0, { table = [[0, 1], [1, 2]] }]"],
-         "environment.wind[2]: expected a number: the model flow has a uniform and steady wind; got a tab"),
         (["environment.wind=[1.0, 0.0, 0.5]"], "environment.wind: expected no component along z"),
         (["environment.density=0.0"], "environment.density: expected a number above 0 for the model flow"),
         (["bodies.0.inertia=[1.0, 1.0, 1.0, 0.0, 0.0, 0.0]"],

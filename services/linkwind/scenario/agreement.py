@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Iterator, Sequence
 from decimal import Decimal
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from linkwind.scenario.functions import Function
 from linkwind.scenario.problems import Path, Problem, choice, show
 from linkwind.scenario.providers import ADDING_INERTIA
 from linkwind.scenario.settings import nanoseconds
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
     from linkwind.scenario.bodies import Body, Joint
     from linkwind.scenario.model import Scenario
     from linkwind.scenario.providers import Provider
+    from linkwind.scenario.settings import Environment
 
 
 RESERVED = ("dynamics", "observer", "router", "ca")  # that a provider must not be called: names of roles
@@ -210,7 +213,7 @@ def _thin(scenario: Scenario, provider: Provider) -> Iterator[Problem]:
 
 
 def _flow(scenario: Scenario, provider: Provider, path: Path) -> Iterator[Problem]:
-    """What a resolved flow asks for: bodies with shapes, in a uniform wind."""
+    """What a resolved flow asks for: bodies with shapes, in a wind that is the same everywhere."""
     acted = [(i, body) for i, body in enumerate(scenario.bodies) if body.name in provider.bodies]
     for index, body in acted:
         if body.shape is None:
@@ -219,17 +222,23 @@ def _flow(scenario: Scenario, provider: Provider, path: Path) -> Iterator[Proble
             yield Problem(("bodies", index, "shape"), expected, "nothing", advice)
     if provider.flow.dimensions == 2:
         yield from _flow_in_the_plane(scenario, acted)
-    if scenario.environment.gusts:
-        expected = "none: the model flow has a uniform wind"
-        got = f"{len(scenario.environment.gusts)} of them"
-        yield Problem(("environment", "gusts"), expected, got, "Remove them, or use the model plate.")
-    for index, function in scenario.environment.wind_functions.items():
-        expected = "a number: the model flow has a uniform and steady wind"
-        got = "a table" if function.expression is None else show(function.expression)
-        advice = "Give it one, or use the model plate or vortex."
-        yield Problem(("environment", "wind", index), expected, got, advice)
+    yield from _wind_of_time(scenario.environment)
     if scenario.environment.density == 0.0:
         yield Problem(("environment", "density"), "a number above 0 for the model flow", "0", "Give it one.")
+
+
+def _wind_of_time(environment: Environment) -> Iterator[Problem]:
+    """A wind that may change with time, and is the same everywhere."""
+    for index, function in environment.wind_functions.items():
+        if places := sorted({"x", "y", "z"} & set(re.findall(r"\w+", function.expression or ""))):
+            expected = "a function of t alone: in the model flow the wind is the same everywhere"
+            advice = f"Leave out {' and '.join(places)}, or use the model plate or vortex."
+            yield Problem(("environment", "wind", index), expected, show(function.expression), advice)
+    for index, gust in enumerate(environment.gusts):
+        if any(gust.wavenumber):
+            expected = "0 along each axis: in the model flow the wind is the same everywhere"
+            got, advice = show(list(gust.wavenumber)), "Leave it out, or use the model plate or vortex."
+            yield Problem(("environment", "gusts", index, "wavenumber"), expected, got, advice)
 
 
 def _flow_in_the_plane(scenario: Scenario, acted: list[tuple[int, Body]]) -> Iterator[Problem]:
@@ -250,11 +259,14 @@ def _flow_in_the_plane(scenario: Scenario, acted: list[tuple[int, Body]]) -> Ite
             expected = f"the span of the others, {spans[0][1]!r} m: the flow is two-dimensional"
             advice = f"Give all the same, {otherwise}"
             yield Problem(("bodies", index, "shape", "span"), expected, show(span), advice)
-    wind = scenario.environment.uniform_wind
-    if wind[2]:
-        expected = "no component along z: the flow is two-dimensional"
-        advice = f"Set z to 0, {otherwise}"
-        yield Problem(("environment", "wind"), expected, show(list(wind)), advice)
+    environment = scenario.environment
+    stated: list[tuple[Path, float | Function]] = [(("wind",), environment.wind[2])]
+    stated += [(("gusts", i, "amplitude"), gust.amplitude[2]) for i, gust in enumerate(environment.gusts)]
+    for path, upwards in stated:
+        if upwards != 0.0:
+            expected = "no component along z: the flow is two-dimensional"
+            got = "a function" if isinstance(upwards, Function) else show(upwards)
+            yield Problem(("environment", *path), expected, got, f"Set z to 0, {otherwise}")
 
 
 def _first(names: Sequence[str]) -> str:

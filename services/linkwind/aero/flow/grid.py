@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from linkwind.aero.base import body_indices, item
+from linkwind.aero.flow.drift import first_wind
 from linkwind.errors import ScenarioError
 from linkwind.native.fluid import shear_rate
 from linkwind.scenario import Provider, Scenario
@@ -97,7 +98,7 @@ def plan(scenario: Scenario, provider: Provider) -> Grid:
     length = max(extent(body, dimensions) for body in acted)
     cell = length / flow.cells
     _check_resolution(scenario, provider, acted, cell)
-    wind = environment.uniform_wind[:dimensions]
+    wind = tuple(first_wind(scenario, dimensions).tolist())
     step = scenario.coupling.step_ns / 1e9
     fastest = max(math.hypot(*wind), *(_speed(body, dimensions) for body in acted))
     substeps = max(1, math.ceil(fastest * step / cell / MAX_SPEED - 1e-9))
@@ -240,7 +241,7 @@ def _check_window(scenario: Scenario, provider: Provider, size: tuple[int, ...],
 
 def _place(scenario: Scenario, dimensions: int) -> tuple[float, ...]:
     """Return where to put the mechanism: upstream and below, for its wake goes with the wind and upwards."""
-    flow = np.array(scenario.environment.uniform_wind[:dimensions])
+    flow = first_wind(scenario, dimensions)
     up = -np.array(scenario.environment.gravity[:dimensions])
     middle = 0.5 + np.zeros(dimensions) - ASIDE * sum(v / math.hypot(*v) for v in (flow, up) if v.any())
     return tuple(middle.tolist())

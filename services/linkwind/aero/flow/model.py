@@ -17,6 +17,7 @@ import numpy as np
 
 from linkwind.aero.base import Capabilities, body_indices
 from linkwind.aero.flow import grid as grids
+from linkwind.aero.flow.drift import Drift
 from linkwind.aero.flow.geometry import geometry
 from linkwind.aero.flow.interior import weakest_axis
 from linkwind.aero.flow.motion import State
@@ -64,6 +65,7 @@ class Flow:
         self._rows = slice(first, first + len(acted)) if in_a_row else self._bodies
         self._in = geometry(self._grid.dimensions)
         self._interior = self._in.inside(acted, self._grid.density)
+        self._drift = Drift(scenario, self._grid.dimensions)
         self._reach = [grids.reach(body, self._grid.dimensions) for body in acted]
         self._twist = np.array(self._in.twist)
         self._lengths = np.where(self._twist < 3, 1.0, self._grid.cell)  # of forces, of torques
@@ -86,8 +88,9 @@ class Flow:
 
     def commit(self, t: float, motion: Motion) -> None:
         """Step the fluid to time t [s] with the accepted motion, or keep where it has gone to already."""
-        accepted = self._in.state(motion, self._rows)
         step = round(t / self._h)
+        self._drift.go(step)
+        accepted = self._drift.now.inside(self._in.state(motion, self._rows))
         if self._fluid is None:
             self._begin(accepted)
         elif step > self._step and not self._ahead:
@@ -103,7 +106,7 @@ class Flow:
             ScenarioError: the window is too small or too large.
             SimulationError: a body leaves the window or meets another, is too fast, or the fluid is unstable.
         """
-        self._trial = self._in.state(motion, self._rows)
+        self._trial = self._drift.at(round(t / self._h)).inside(self._in.state(motion, self._rows))
         if self._fluid is None:
             self._begin(self._trial)
         elif self._ahead:
@@ -121,8 +124,8 @@ class Flow:
         if self._fluid is None or not self._every or step == self._shown or step % self._every:
             return None
         self._shown = step
-        density = self._scenario.environment.density
-        return self._fluid.picture(density, step, step * self._scenario.coupling.step_ns)
+        density, time_ns = self._scenario.environment.density, step * self._scenario.coupling.step_ns
+        return self._fluid.picture(density, step, time_ns, self._drift.at(step))
 
     def save(self) -> bytes:
         """Return the whole fluid, as it was committed, as an opaque blob; empty before the first motion."""
@@ -130,7 +133,7 @@ class Flow:
             return b""
         motions = np.hstack([*self._start, *self._accepted]).astype("<f8")
         leak = self._leak if self._substeps == 1 else 0.0  # else it belongs to the trial
-        memory = _MEMORY.pack(self._step, self._shown, leak) + motions.tobytes()
+        memory = _MEMORY.pack(self._step, self._shown, leak) + self._drift.save() + motions.tobytes()
         if not self._ahead:
             return memory + self._fluid.save()
         self._fluid.back()
@@ -147,20 +150,23 @@ class Flow:
         self._ahead = False
         if not blob:
             self._fluid, self._step, self._substeps = None, 0, self._grid.substeps
+            self._drift = Drift(self._scenario, self._grid.dimensions)
             return
         n, width = len(self._bodies), self._in.width
         each = width + len(self._twist)  # numbers of a state
-        if len(blob) < _MEMORY.size + 16 * each * n:
+        motions = _MEMORY.size + 8 * self._grid.dimensions
+        if len(blob) < motions + 16 * each * n:
             raise ProtocolError(f"model flow: expected a checkpoint; got {len(blob)} bytes.")
         self._step, self._shown, self._leak = _MEMORY.unpack_from(blob)
-        numbers = np.frombuffer(blob, "<f8", 2 * each * n, _MEMORY.size).reshape(n, 2 * each)
+        self._drift.restore(self._step, blob[_MEMORY.size : motions])
+        numbers = np.frombuffer(blob, "<f8", 2 * each * n, motions).reshape(n, 2 * each)
         parts = np.split(numbers, [width, each, each + width], axis=1)
         start, accepted = State(*parts[:2]), State(*parts[2:])
         if self._fluid is None:
             self._begin(start)
         self._set_out(start)
         self._accepted = accepted
-        self._window.restore(blob[_MEMORY.size + 16 * each * n :])
+        self._window.restore(blob[motions + 16 * each * n :])
         self._substeps = round(self._h / self._window.step)
         self._measure()
 
@@ -195,7 +201,7 @@ class Flow:
 
     def _set_out(self, start: State) -> None:
         self._start = start
-        self._slowly = SmoothStart(self._scenario, self._provider, self._grid.length, start.twist)
+        self._slowly = SmoothStart(self._provider.flow.start_time, self._grid, start.twist)
 
     def _place(self, t: float, at: State) -> None:
         placement, marker = self._window.place(self._walls, at.pose)
@@ -266,11 +272,15 @@ class Flow:
         self._leak = self._leak if leak is None else leak
 
     def _inside(self, t: float, wall: Array, inertia: Array) -> Array:
-        """Return the force that the fluid inside the outlines took, shape (n, d)."""
+        """Return what the fluid inside the outlines took, and what a wind that changes gives, (n, d)."""
         before = self._slowly(t - self._h, self._accepted.twist)
         then = self._interior.inertia(self._accepted.pose)
         gained = (inertia * wall[:, None, :]).sum(axis=2) - (then * before[:, None, :]).sum(axis=2)
-        return np.asarray(gained / self._h)
+        force = np.asarray(gained / self._h)
+        faster = self._drift.acceleration(round(t / self._h))
+        if faster is not None:
+            force += (inertia[:, :, : len(faster)] * faster).sum(axis=2)
+        return force
 
     def _measure(self) -> None:
         """Compute what a lattice unit of force and torque, and of the response, is [N, N·m; N·s/m …]."""

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from linkwind.scenario import Provider, Scenario
+from linkwind.aero.flow.grid import Grid
 from linkwind.spatial import Array
 
 
@@ -14,18 +14,16 @@ class SmoothStart:
     """The twists that the fluid is given: at first those of the stream, then more and more the bodies'.
 
     Args:
-        scenario, provider: with the wind and the time to start in.
-        length: of the longest body [m]; to go along it is the wind's time by default.
+        stated: the time to start in [s]; None for the wind's time along the longest body.
+        grid: with the wind and the longest body.
         first: twists of the bodies at the start, shape (n, 3) in the plane, (n, 6) in space, in W.
     """
 
-    def __init__(self, scenario: Scenario, provider: Provider, length: float, first: Array) -> None:
-        wind = scenario.environment.uniform_wind[: provider.flow.dimensions]
-        speed = math.hypot(*wind)
-        default = length / speed if speed else 0.0
-        stated = provider.flow.start_time
+    def __init__(self, stated: float | None, grid: Grid, first: Array) -> None:
+        speed = math.hypot(*grid.wind)
+        default = grid.length / speed if speed else 0.0
         self._time = default if stated is None else stated
-        self._slip = np.array([*wind, *([0.0] * (first.shape[1] - len(wind)))]) - first
+        self._slip = np.array([*grid.wind, *([0.0] * (first.shape[1] - len(grid.wind)))]) - first
 
     def __call__(self, t: float, twist: Array) -> Array:
         """Return the twists of the walls at time t [s] for bodies with the twists ``twist``."""

@@ -7,6 +7,7 @@ import struct
 import numpy as np
 from numpy.typing import NDArray
 
+from linkwind.aero.flow.drift import Frame
 from linkwind.aero.flow.geometry import Geometry, Place, Walls
 from linkwind.aero.flow.grid import Grid
 from linkwind.errors import ProtocolError
@@ -89,13 +90,17 @@ class Window:
         self.step *= 0.5
         self.lattice.halve_step(shear_rate(viscosity * self.step / self._cell**2))
 
-    def picture(self, density: float, step: int, time_ns: int) -> FlowFrame | VolumeFrame:
-        """Return the fluid in world units; ``density`` in kg/m³."""
+    def picture(self, density: float, step: int, time_ns: int, frame: Frame) -> FlowFrame | VolumeFrame:
+        """Return the fluid in the world, where the window goes with ``frame``; ``density`` in kg/m³."""
         stride = self._geometry.stride(self.size)
         first = self._corner + (self.offset + 0.5 * (stride - 1)) * self._cell
         pressure = density * self.speed**2 / 3.0
+        first += frame.way
         place = Place(tuple(first.tolist()), stride * self._cell, self.speed, pressure, self.step)
-        return self._geometry.picture(step, time_ns, place, self.lattice.moments(stride))
+        picture = self._geometry.picture(step, time_ns, place, self.lattice.moments(stride))
+        if frame.velocity.any():
+            picture.velocity[...] += frame.velocity.astype(np.float32)
+        return picture
 
     def keep(self) -> None:
         """Remember the fluid, to come ``back`` to it for another coupling iteration."""
