@@ -1,10 +1,10 @@
-"""A wind that changes with time: the frame in which the fluid far away keeps its first velocity.
+"""A wind that changes with time: the frame in which the fluid far away is steady.
 
-The lattice goes through the world with V(t) = U(t) − U(0), so that its stream is steady, and bodies are in it
-with their velocities less V. What makes the fluid far away faster is a pressure that falls along dV/dt
-everywhere; in the frame of the lattice it cancels, in the world it pushes every volume by ρ dV/dt, that of a
-body as well (the part of Froude and Krylov; C. E. Brennen, *A Review of Added Mass and Fluid Inertial
-Forces*, 1982, NCEL CR 82.010).
+The lattice goes through the world with V(t), which is all of the wind but its constant components: these are
+the stream in the lattice, and bodies are in it with their velocities less V. What makes the fluid far away
+faster is a pressure that falls along dV/dt everywhere; in the frame of the lattice it cancels, in the world
+it pushes every volume by ρ dV/dt, that of a body as well (the force of Froude and Krylov; J. N. Newman,
+*Marine Hydrodynamics*, MIT Press 1977, ch. 4).
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from linkwind.aero.flow.motion import State
-from linkwind.errors import ProtocolError
 from linkwind.scenario import Scenario
 from linkwind.spatial import Array
 from linkwind.wind import Wind
@@ -40,7 +39,7 @@ class Frame(NamedTuple):
 
 
 def first_wind(scenario: Scenario, dimensions: int) -> Array:
-    """Return the wind at the start [m/s], shape (d,)."""
+    """Return the wind at the start [m/s], shape (d,), in W."""
     return Wind(scenario).velocity(0.0, np.zeros(3))[:dimensions]
 
 
@@ -54,10 +53,14 @@ class Drift:
     def __init__(self, scenario: Scenario, dimensions: int) -> None:
         environment = scenario.environment
         self._changes = bool(environment.wind_functions or environment.gusts)
-        self._wind, self._first = Wind(scenario), first_wind(scenario, dimensions)
+        self._wind, self._stream = Wind(scenario), np.array(environment.uniform_wind)
         self._h = scenario.coupling.step_ns / 1e9
-        self._step = 0
-        self.now = Frame(np.zeros(dimensions), np.zeros(dimensions))
+        self._dimensions = dimensions
+        self.restart(0, np.zeros(dimensions))
+
+    def restart(self, step: int, way: Array) -> None:
+        """Take a point as committed, up to which the frame has gone so far."""
+        self.now, self._step = Frame(self._velocity(step), way), step
 
     def at(self, step: int) -> Frame:
         """Return the frame at the point that was committed, or at the next one."""
@@ -74,18 +77,8 @@ class Drift:
         """Return the mean of dV/dt over the step to a point [m/s²], shape (d,); None in a steady wind."""
         return (self.at(step).velocity - self.now.velocity) / self._h if self._changes else None
 
-    def save(self) -> bytes:
-        """Return what the past has left behind."""
-        return self.now.way.astype("<f8").tobytes()
-
-    def restore(self, step: int, blob: bytes) -> None:
-        """Take back what ``save`` returned after the point ``step``."""
-        d = len(self.now.way)
-        if len(blob) != 8 * d:
-            raise ProtocolError(f"model flow: expected {8 * d} bytes of its frame; got {len(blob)}.")
-        velocity = self._velocity(step) if self._changes else np.zeros(d)
-        self.now, self._step = Frame(velocity, np.frombuffer(blob, "<f8").copy()), step
-
     def _velocity(self, step: int) -> Array:
+        if not self._changes:
+            return np.zeros(self._dimensions)
         wind = self._wind.velocity(step * self._h, np.zeros(3))
-        return np.asarray(wind[: len(self._first)] - self._first)
+        return np.asarray((wind - self._stream)[: self._dimensions])

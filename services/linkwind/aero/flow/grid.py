@@ -44,7 +44,7 @@ class Grid:
         place: where the middle of the mechanism stands in the window, as a share of its sides.
         density: of the fluid [kg/m³], in the plane times the span of the bodies [kg/m²].
         viscosity: kinematic [m²/s].
-        wind: [m/s], in W, as many components as dimensions.
+        wind: the part of it that never changes [m/s], in W, as many components as dimensions.
     """
 
     cell: float
@@ -73,7 +73,7 @@ class Grid:
 
     @property
     def stream(self) -> tuple[float, ...]:
-        """The wind [cells/step]."""
+        """The velocity of the fluid far away, in the frame of the lattice [cells/step]."""
         return tuple(component / self.speed for component in self.wind)
 
     @property
@@ -98,9 +98,10 @@ def plan(scenario: Scenario, provider: Provider) -> Grid:
     length = max(extent(body, dimensions) for body in acted)
     cell = length / flow.cells
     _check_resolution(scenario, provider, acted, cell)
-    wind = tuple(first_wind(scenario, dimensions).tolist())
+    wind = environment.uniform_wind[:dimensions]
     step = scenario.coupling.step_ns / 1e9
-    fastest = max(math.hypot(*wind), *(_speed(body, dimensions) for body in acted))
+    first = first_wind(scenario, dimensions).tolist()
+    fastest = max(math.hypot(*wind), math.hypot(*first), *(_speed(body, dimensions) for body in acted))
     substeps = max(1, math.ceil(fastest * step / cell / MAX_SPEED - 1e-9))
     if substeps > MAX_SUBSTEPS:
         raise ScenarioError(
@@ -163,6 +164,14 @@ def _speed(body: Body, dimensions: int) -> float:
     """Return the speed of the fastest point of a body at the start, as far as it states it [m/s]."""
     turning = math.hypot(*(body.angular_velocity or (0.0,)))
     return math.hypot(*(body.velocity or (0.0,))) + turning * reach(body, dimensions)
+
+
+def start_time(scenario: Scenario, provider: Provider, grid: Grid) -> float:
+    """Return the time of a smooth start [s]: as stated, or the wind's time along the longest body."""
+    if provider.flow.start_time is not None:
+        return provider.flow.start_time
+    speed = math.hypot(*first_wind(scenario, grid.dimensions).tolist())
+    return grid.length / speed if speed else 0.0
 
 
 def window(scenario: Scenario, provider: Provider, grid: Grid, centres: Array) -> tuple[int, ...]:

@@ -73,6 +73,7 @@ class Flow:
         self._entries = (6 * len(acted) * rows[:, None] + rows).ravel()  # of G in space
         self._every = max(1, round(scenario.steps / provider.flow.frames)) if provider.flow.frames else 0
         self._h = scenario.coupling.step_ns / 1e9
+        self._start_time = grids.start_time(scenario, provider, self._grid)
         self._substeps = self._grid.substeps
         self._fluid: Window | None = None
         self._step, self._shown, self._leak = 0, -1, 0.0
@@ -133,7 +134,11 @@ class Flow:
             return b""
         motions = np.hstack([*self._start, *self._accepted]).astype("<f8")
         leak = self._leak if self._substeps == 1 else 0.0  # else it belongs to the trial
-        memory = _MEMORY.pack(self._step, self._shown, leak) + self._drift.save() + motions.tobytes()
+        memory = (
+            _MEMORY.pack(self._step, self._shown, leak)
+            + self._drift.now.way.astype("<f8").tobytes()
+            + motions.tobytes()
+        )
         if not self._ahead:
             return memory + self._fluid.save()
         self._fluid.back()
@@ -150,7 +155,7 @@ class Flow:
         self._ahead = False
         if not blob:
             self._fluid, self._step, self._substeps = None, 0, self._grid.substeps
-            self._drift = Drift(self._scenario, self._grid.dimensions)
+            self._drift.restart(0, np.zeros(self._grid.dimensions))
             return
         n, width = len(self._bodies), self._in.width
         each = width + len(self._twist)  # numbers of a state
@@ -158,7 +163,7 @@ class Flow:
         if len(blob) < motions + 16 * each * n:
             raise ProtocolError(f"model flow: expected a checkpoint; got {len(blob)} bytes.")
         self._step, self._shown, self._leak = _MEMORY.unpack_from(blob)
-        self._drift.restore(self._step, blob[_MEMORY.size : motions])
+        self._drift.restart(self._step, np.frombuffer(blob[_MEMORY.size : motions], "<f8").copy())
         numbers = np.frombuffer(blob, "<f8", 2 * each * n, motions).reshape(n, 2 * each)
         parts = np.split(numbers, [width, each, each + width], axis=1)
         start, accepted = State(*parts[:2]), State(*parts[2:])
@@ -201,7 +206,7 @@ class Flow:
 
     def _set_out(self, start: State) -> None:
         self._start = start
-        self._slowly = SmoothStart(self._provider.flow.start_time, self._grid, start.twist)
+        self._slowly = SmoothStart(self._start_time, self._grid.wind, start.twist)
 
     def _place(self, t: float, at: State) -> None:
         placement, marker = self._window.place(self._walls, at.pose)

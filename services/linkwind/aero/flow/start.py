@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from linkwind.aero.flow.grid import Grid
 from linkwind.spatial import Array
 
 
@@ -14,16 +13,14 @@ class SmoothStart:
     """The twists that the fluid is given: at first those of the stream, then more and more the bodies'.
 
     Args:
-        stated: the time to start in [s]; None for the wind's time along the longest body.
-        grid: with the wind and the longest body.
-        first: twists of the bodies at the start, shape (n, 3) in the plane, (n, 6) in space, in W.
+        time: to start in [s].
+        stream: velocity of the fluid far away [m/s], in the frame of the lattice.
+        first: twists of the bodies at the start, shape (n, 3) in the plane, (n, 6) in space, in this frame.
     """
 
-    def __init__(self, stated: float | None, grid: Grid, first: Array) -> None:
-        speed = math.hypot(*grid.wind)
-        default = grid.length / speed if speed else 0.0
-        self._time = default if stated is None else stated
-        self._slip = np.array([*grid.wind, *([0.0] * (first.shape[1] - len(grid.wind)))]) - first
+    def __init__(self, time: float, stream: Sequence[float], first: Array) -> None:
+        self._time = time
+        self._slip = np.array([*stream, *([0.0] * (first.shape[1] - len(stream)))]) - first
 
     def __call__(self, t: float, twist: Array) -> Array:
         """Return the twists of the walls at time t [s] for bodies with the twists ``twist``."""
