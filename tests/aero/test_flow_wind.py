@@ -137,7 +137,7 @@ def test_in_space_the_volume_is_pushed_as_the_fluid_is():
     ("environment.gusts=[{ amplitude = [1.0, 0.0], frequency = 1.0, wavenumber = [0.1, 0.0] }]",
      r"environment.gusts\[0\].wavenumber: expected 0 along each axis: in the model flow the wind is"),
     ("environment.gusts=[{ amplitude = [0.0, 0.0, 1.0], frequency = 1.0 }]",
-     r"environment.gusts\[0\].amplitude: expected no component along z: the flow is two-dimensional; got 1.0"),
+     r"environment.gusts\[0\].amplitude: expected no component along z: .*; got 1.0"),
     ("environment.wind=[1, 0, 't']", "environment.wind: expected no component along z.*got a function"),
 ])  # fmt: skip
 def test_a_wind_that_differs_from_place_to_place_is_refused(setting, message):

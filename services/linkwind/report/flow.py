@@ -20,9 +20,9 @@ PAPER = (0.48, 1.14)  # s, the times that Rahmati & Karimi (2021) show the flow 
 NEAR = 0.08  # of the run; an even time that is nearer to one of the paper's gives way to it
 SAMPLES = 2_000_000  # values that a scale is taken from
 
-# Share of the speeds of all frames within the scale, and of the rotation, the sum of |ω|, that is where |ω| is
-# within its scale: the few values next to an edge would make all else pale, and how much of the window is still
-# says nothing.
+# Share of the speeds of all frames within their scale, and of the rotation, the sum of |ω|, that is where |ω|
+# is within its own: the few values next to an edge would make all else pale, and how much of the window is
+# still says nothing.
 SPEED_SHARE, ROTATION_SHARE = 99.8, 35.0
 
 

@@ -17,7 +17,9 @@ PHYSICS = (
     r"time\.end|environment\..*|joints\.\d+\.(stiffness|damping|rest).*|dynamics\.(integrator|substeps|rtol|atol)"
     r"|forces\.\d+\.inputs\..*|providers\.\d+\.(plate|field)\..*|providers\.\d+\.(flow|vortex)\.frames"
 )
-REMEMBERED = r"environment\.(wind|inputs|density|viscosity|gusts).*"  # by a flow: its lattice has them in its state
+REMEMBERED = (
+    r"environment\.(wind|inputs|density|viscosity|gusts).*"  # by a flow: its lattice has them in its state
+)
 MAY_CHANGE = (
     "time.end, environment.*, joints.*.stiffness, .damping and .rest, dynamics.integrator, .substeps, .rtol "
     "and .atol, forces.*.inputs, the settings of the models plate and field, coupling.timeout, bus.*, log.*"
