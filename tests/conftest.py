@@ -12,7 +12,6 @@ FLOWS = (
     "vortex_induced_vibration",
 )
 SLOW = (
-    "tests/bus/test_checkpoints.py::test_large",
     "tests/docker/test_stay.py",
     "tests/bus/test_secure.py::test_recorder_is_told_as_well",
     "tests/dynamics/test_recovery.py::test_a_death_at_any_moment_changes_no_bit[right-",

@@ -1,19 +1,25 @@
-"""Checkpoints on the bus: large ones, there when the wrench or the Bye is; a provider begins with one."""
+"""Checkpoints on the bus: in many pieces, there when the wrench or the Bye is; a provider begins with one."""
 
 from __future__ import annotations
 
+import pytest
+
+from linkwind import checkpoints
+from linkwind.bus.inprocess import InProcessLink
 from linkwind.bus.zenoh import ZenohDynamicsLink, loopback_endpoint
-from linkwind.checkpoints import Checkpoint
-from linkwind.protocol import Course
+from linkwind.bus.zenoh.dynamics import PIECES
+from linkwind.checkpoints import Checkpoint, State
+from linkwind.protocol import Course, DynamicsSession, ProviderSession
 from linkwind.spatial import Motion
-from tests.bus.test_zenoh import Provider, finish, session
+from tests.bus.test_zenoh import STEP_NS, Provider, finish, session
 from tests.fakes import FakeModel
 
-SIZE = 48_000_000  # bytes: a flow of two million cells and more
+PIECE = 1000  # bytes
+SIZE = 2 * PIECES * PIECE + 1  # more pieces than can wait for the dynamics
 
 
 class Large(FakeModel):
-    """Its memory is large, and begins with the number of commits."""
+    """Its memory begins with the number of commits."""
 
     count = 0
 
@@ -21,30 +27,42 @@ class Large(FakeModel):
         self.count += 1
 
     def save(self) -> bytes:
-        return self.count.to_bytes(8, "little") + bytes(SIZE)
+        return self.count.to_bytes(8, "little") + bytes(SIZE - 8)
 
     def restore(self, blob: bytes) -> None:
-        assert len(blob) == SIZE + 8
+        assert len(blob) == SIZE
         self.count = int.from_bytes(blob[:8], "little")
 
 
-def march(course: Course, first: int) -> list[tuple[int, Checkpoint]]:
+@pytest.fixture(autouse=True)
+def small_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(checkpoints, "PIECE", PIECE)
+
+
+def steps(
+    d: DynamicsSession, link: ZenohDynamicsLink | InProcessLink, first: int
+) -> list[tuple[int, Checkpoint]]:
     """Do the steps from ``first`` on; return the checkpoints, each with the exchange that brought it."""
+    came: list[tuple[int, Checkpoint]] = []
+    for step in range(first, 11):
+        link.post(d.post(step, 0))
+        while not d.answered:
+            d.accept(*link.receive())
+        came += [(step, checkpoint) for _, checkpoint in d.checkpoints()]
+    finish(d, link)
+    came += [(11, checkpoint) for _, checkpoint in d.checkpoints()]
+    d.check_frames()
+    return came
+
+
+def over_zenoh(course: Course, first: int) -> list[tuple[int, Checkpoint]]:
     endpoint, d = loopback_endpoint(), session()
     d.course = course
-    came: list[tuple[int, Checkpoint]] = []
     link = ZenohDynamicsLink(d, [endpoint], [], 10.0)
     try:
         provider = Provider(endpoint, Large())
         assert link.wait(lambda: not d.not_ready, 20.0, lambda: None)
-        for step in range(first, 11):
-            link.post(d.post(step, 0))
-            while not d.answered:
-                d.accept(*link.receive())
-            came += [(step, d.checkpoint(*sent)) for sent in link.checkpoints()]
-        finish(d, link)
-        came += [(11, d.checkpoint(*sent)) for sent in link.checkpoints()]
-        d.check_frames()
+        came = steps(d, link, first)
     finally:
         link.close()
     provider.join(10.0)
@@ -52,8 +70,18 @@ def march(course: Course, first: int) -> list[tuple[int, Checkpoint]]:
     return came
 
 
-def test_large_checkpoints_there_and_back() -> None:
+def in_process(course: Course, first: int) -> list[tuple[int, Checkpoint]]:
+    d = session()
+    d.course = course
+    return steps(d, InProcessLink(d, [ProviderSession("aero", lambda scenario, name: Large())]), first)
+
+
+@pytest.mark.parametrize("march", [in_process, over_zenoh])
+def test_there_and_back(march) -> None:  # type: ignore[no-untyped-def]
     came = march(Course(checkpoint_every=5), 0)
-    assert [(exchange, checkpoint.step) for exchange, checkpoint in came] == [(6, 5), (11, 10)]
-    resumed = march(Course(5, start=5, states={"aero": (1, came[0][1].state)}), 6)
-    assert resumed == came
+    expected = [State.of(count.to_bytes(8, "little") + bytes(SIZE - 8)) for count in (6, 11)]
+    assert came == [
+        (6, Checkpoint(1, 5, 5 * STEP_NS, expected[0])),
+        (11, Checkpoint(2, 10, 10 * STEP_NS, expected[1])),
+    ]
+    assert march(Course(5, start=5, states={"aero": came[0][1]}, piece=SIZE // 3), 6) == came

@@ -5,14 +5,11 @@
 
 from __future__ import annotations
 
-from contextlib import closing
-
 import pytest
 
-from linkwind.bus.zenoh import LARGEST, ZenohProviderLink, loopback_endpoint
 from linkwind.bus.zenoh.dynamics import largest_wrench
-from linkwind.bus.zenoh.session import LARGEST_MOTION
-from linkwind.errors import SimulationError
+from linkwind.bus.zenoh.session import LARGEST_MOTION, LARGEST_PIECE
+from linkwind.checkpoints import PIECE, Checkpoint, State
 from linkwind.messages import MotionMessage, WrenchMessage
 
 NUMBERS = ["a number"] * 1000
@@ -31,9 +28,8 @@ def test_motion_of_thirty_thousand_bodies_fits() -> None:
     assert len(MotionMessage(RUN, 30_000).payload()) < LARGEST_MOTION
 
 
-def test_checkpoint_that_is_too_large_is_refused() -> None:
-    endpoint = loopback_endpoint()
-    with closing(ZenohProviderLink([endpoint], [], name="aero")) as link:
-        link.join("run")
-        with pytest.raises(SimulationError, match="checkpoint: expected at most 268 MB; got 268 MB"):
-            link.keep(bytes(LARGEST))
+def test_every_piece_of_a_checkpoint_fits() -> None:
+    whole = Checkpoint(2**63, 2**63, 2**63, State.of(bytes(2 * PIECE + 1)))
+    sizes = [len(piece) for piece in whole.pieces(RUN, RUN)]
+    assert len(sizes) == 3
+    assert PIECE < max(sizes) < LARGEST_PIECE

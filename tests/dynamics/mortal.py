@@ -44,7 +44,6 @@ class MortalLink:
         self._gone: set[str] = set()
         self._answers: deque[tuple[str, bytes]] = deque()
         self._frames: list[tuple[str, bytes]] = []
-        self._checkpoints: list[tuple[str, bytes]] = []
         self._losses: deque[LostError] = deque()
 
     def _moment(self, name: str) -> None:
@@ -69,6 +68,9 @@ class MortalLink:
         try:
             provider.welcome(self._session.control(provider.hello()))
             self._moment(name)
+            while (missing := provider.fetch()) is not None:
+                provider.fetched(self._session.control(missing))
+                self._moment(name)
             provider.build()
             seen = True  # its liveliness token is there
             self._moment(name)
@@ -115,8 +117,8 @@ class MortalLink:
         for frame in provider.frames():
             self._frames.append((name, frame))
             self._moment(name)
-        for checkpoint in provider.checkpoints():
-            self._checkpoints.append((name, checkpoint))
+        for piece in provider.pieces():
+            self._session.piece(name, piece)
             self._moment(name)
         if answer is not None:
             self._answers.append((name, answer))
@@ -133,10 +135,6 @@ class MortalLink:
 
     def frames(self) -> list[tuple[str, bytes]]:
         taken, self._frames = self._frames, []
-        return taken
-
-    def checkpoints(self) -> list[tuple[str, bytes]]:
-        taken, self._checkpoints = self._checkpoints, []
         return taken
 
     def listeners(self, topics: Sequence[str], description: bytes) -> None:

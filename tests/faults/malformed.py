@@ -17,7 +17,7 @@ from random import Random
 
 import numpy as np
 
-from linkwind.checkpoints import Checkpoint
+from linkwind.checkpoints import Checkpoint, State
 from linkwind.errors import ParticipantError, SimulationError
 from linkwind.frames import FlowFrame, Sent, VolumeFrame, WakeFrame
 from linkwind.messages import MotionMessage, WrenchMessage
@@ -56,7 +56,7 @@ def good() -> dict[str, bytes]:
         "frame": frame.encode(RUN, "aero", 1),
         "volume": volume.encode(RUN, "aero", 1),
         "wake": wake.encode(RUN, "aero", 1),
-        "checkpoint": Checkpoint(1, 1_000_000, b"memory").encode(RUN, "aero", 1),
+        "checkpoint": next(Checkpoint(1, 1, 1_000_000, State.of(b"memory")).pieces(RUN, "aero")),
         "hello": control(hello=hello).SerializeToString(),
         "ready": control(ready={"name": "aero", "instance": "x", "kind": 1}).SerializeToString(),
         "bye": control(bye={"name": "aero"}).SerializeToString(),
@@ -169,7 +169,7 @@ class Ends:
         elif kind in ("volume", "wake"):
             dynamics.frame("aero", Sent(kind, payload))
         elif kind == "checkpoint":
-            dynamics.checkpoint("aero", payload)
+            dynamics.piece("aero", payload)
         elif kind == "welcome":
             ProviderSession("aero", lambda scenario, name: FakeModel()).welcome(payload)
         elif kind == "fault":

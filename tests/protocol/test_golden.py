@@ -16,9 +16,13 @@ import numpy as np
 import pytest
 from google.protobuf.json_format import MessageToDict, ParseDict
 
+from linkwind.checkpoints import Checkpoint, Joining, State
+from linkwind.checkpoints import decode as decode_piece
 from linkwind.frames import FlowFrame, Sent, VolumeFrame, WakeFrame, decode
 from linkwind.messages import MotionMessage, WrenchMessage
+from linkwind.protocol import ProviderSession
 from linkwind.schema import MESSAGES
+from tests.fakes import FakeModel
 
 GOLDEN = Path(__file__).parents[2] / "schemas" / "golden"
 
@@ -50,6 +54,8 @@ def vectors() -> dict[str, tuple[str, dict[str, Any]]]:
         "volume_frame": ("VolumeFrame", volume_frame()),
         "wake_frame": ("WakeFrame", wake_frame()),
         "checkpoint": ("Checkpoint", checkpoint()),
+        "fetch": ("Control", {"fetch": {"name": "aero", "instance": "i", "offset": "5"}}),
+        "fetch_answer": ("Control", {"checkpoint": piece(MEMORY, 5, 8)}),
         "welcome_resume": ("Control", {"welcome": welcome()}),
         "welcome_catch_up": ("Control", {"welcome": welcome() | {"catchUp": catch_up()}}),
         "ready_answers": ("Control", {"ready": ready()}),
@@ -63,12 +69,27 @@ def vectors() -> dict[str, tuple[str, dict[str, Any]]]:
     }
 
 
+MEMORY = bytes(range(1, 9))  # comes back in two pieces
+
+
 def checkpoint() -> dict[str, Any]:
-    """Four bytes of memory; bytes are base64 in JSON."""
+    """Four bytes of memory in one piece; bytes are base64 in JSON."""
     state = bytes([0, 1, 128, 255])
-    content = {"state": state, "sha256": hashlib.sha256(state).digest()}
-    when = {"run": "golden", "provider": "aero", "number": "3", "step": "120", "timeNs": "120000000"}
-    return when | {name: base64.b64encode(value).decode() for name, value in content.items()}
+    return piece(state, 0, len(state))
+
+
+def piece(state: bytes, begin: int, end: int) -> dict[str, Any]:
+    """A piece of a provider's memory."""
+    content = {"sha256": hashlib.sha256(state).digest(), "state": state[begin:end]}
+    when = {
+        "number": "3",
+        "step": "120",
+        "timeNs": "120000000",
+        "size": str(len(state)),
+        "offset": str(begin),
+    }
+    encoded = {name: base64.b64encode(value).decode() for name, value in content.items()}
+    return {"run": "golden", "provider": "aero"} | when | encoded
 
 
 def welcome() -> dict[str, Any]:
@@ -76,7 +97,7 @@ def welcome() -> dict[str, Any]:
     return {
         "run": "golden", "scenarioJson": "{}", "stepNs": "1000000", "steps": "1200",
         "bodies": ["link1", "link2"], "providerBodies": ["link2"], "checkpointEvery": "40",
-        "resume": {"step": "120", "state": checkpoint()["state"], "number": "3"},
+        "resume": piece(MEMORY, 0, 5),
         "changes": [{"step": "500", "scenarioJson": "{}"}],
     }  # fmt: skip
 
@@ -216,6 +237,25 @@ def test_wings_and_wakes_are_written_and_read_as_the_golden_bytes() -> None:
     assert frame.corner[1, 1, 1].tolist() == np.array(numbers(40, 0.25)[27:30], "<f4").tolist()
     assert frame.strength.tobytes() == base64.b64decode(values["strength"])
     assert frame.encode("golden", "aero", 4) == encoded
+
+
+def test_a_checkpoint_is_split_and_joined_as_the_golden_bytes() -> None:
+    _, encoded = golden("checkpoint")
+    whole = Joining("golden").add(decode_piece(encoded, "golden", "aero"))
+    assert whole == Checkpoint(3, 120, 120_000_000, State.of(bytes([0, 1, 128, 255])))
+    assert list(whole.pieces("golden", "aero")) == [encoded]
+
+
+def test_a_provider_gets_its_memory_back_in_the_golden_pieces() -> None:
+    model = FakeModel()
+    provider = ProviderSession("aero", lambda scenario, name: model)
+    provider.instance = "i"
+    provider.welcome(golden("welcome_resume")[1])
+    assert provider.fetch() == golden("fetch")[1]
+    provider.fetched(golden("fetch_answer")[1])
+    assert provider.fetch() is None
+    provider.build()
+    assert model.calls == [("restore", MEMORY)]
 
 
 @pytest.mark.parametrize("added", [False, True])

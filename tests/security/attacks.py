@@ -50,7 +50,7 @@ def hostile() -> dict[str, bytes]:
         "motion": b"nonsense",
         "wrench/aero": b"nonsense",
         "observe/flow/aero": b"nonsense",
-        "observe/checkpoint/aero": b"nonsense",
+        "checkpoint/aero": b"nonsense",
         "fault": end,
     }
 

@@ -51,6 +51,8 @@ def serve(link: ProviderLink, provider: ProviderSession, start_timeout: float) -
     provider.welcome(link.request(provider.hello(), start_timeout))
     _log.info('"%s": takes part in run %s', provider.name, provider.run)
     try:
+        while (missing := provider.fetch()) is not None:
+            provider.fetched(link.request(missing, start_timeout))
         provider.build()
         link.join(provider.run)
         provider.catch_up()
@@ -59,8 +61,8 @@ def serve(link: ProviderLink, provider: ProviderSession, start_timeout: float) -
             answer = provider.answer(link.receive())
             for frame in provider.frames():
                 link.show(frame)
-            for checkpoint in provider.checkpoints():
-                link.keep(checkpoint)
+            for piece in provider.pieces():
+                link.keep(piece)
             if answer is not None:
                 link.reply(answer)
     except Exception as error:

@@ -1,9 +1,9 @@
 """What a transport has to offer: the two ends of the bus.
 
 A transport moves ``(key, bytes)`` and tells who is there; it knows no message but Fault. Keys are
-``linkwind/v1/<run>/motion``, ``…/wrench/<provider>``, ``…/observe/<kind>/<provider>`` with the kind of a
-frame or ``checkpoint``, ``…/control/<provider>``, ``…/refusal``, ``…/fault`` and ``…/alive/<participant>``,
-and for listeners ``…/scenario`` and ``…/log/**``.
+``linkwind/v1/<run>/motion``, ``…/wrench/<provider>``, ``…/checkpoint/<provider>``,
+``…/observe/<kind>/<provider>`` with the kind of a frame, ``…/control/<provider>``, ``…/refusal``, ``…/fault``
+and ``…/alive/<participant>``, and for listeners ``…/scenario`` and ``…/log/**``.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from typing import Protocol
 from linkwind.frames import Sent
 
 PREFIX = "linkwind/v1"
-CHECKPOINT = "checkpoint"  # what is observed of a provider, beside its frames
 
 
 class LogStream(Protocol):
@@ -43,7 +42,11 @@ class LogStream(Protocol):
 
 
 class DynamicsLink(Protocol):
-    """The dynamics' end: providers come to it."""
+    """The dynamics' end: providers come to it.
+
+    Pieces of checkpoints go to the dynamics' session as they come; one that was sent before a wrench, or
+    before a Bye, is there when that is.
+    """
 
     def wait(self, done: Callable[[], bool], timeout: float, poll: Callable[[], None]) -> bool:
         """Wait until ``done`` holds, which control requests bring about.
@@ -84,10 +87,6 @@ class DynamicsLink(Protocol):
 
         A frame that was sent before a wrench, or before a Bye, is there when that is.
         """
-        ...
-
-    def checkpoints(self) -> list[tuple[str, bytes]]:
-        """Take the checkpoints that have come, like :meth:`frames`."""
         ...
 
     def fault(self, payload: bytes) -> None:
@@ -137,8 +136,8 @@ class ProviderLink(Protocol):
         """Send a frame to the dynamics."""
         ...
 
-    def keep(self, checkpoint: bytes) -> None:
-        """Send a checkpoint to the dynamics."""
+    def keep(self, piece: bytes) -> None:
+        """Send a piece of a checkpoint to the dynamics."""
         ...
 
     def reply(self, wrench: bytes) -> None:

@@ -27,11 +27,12 @@ class InProcessLink:
         self.providers = list(providers)
         self._answers: deque[tuple[str, bytes]] = deque()
         self._frames: list[tuple[str, Sent]] = []
-        self._checkpoints: list[tuple[str, bytes]] = []
         self._trouble: FaultError | None = None
         try:
             for provider in self.providers:
                 provider.welcome(session.control(provider.hello()))
+                while (missing := provider.fetch()) is not None:
+                    provider.fetched(session.control(missing))
                 provider.build()
                 provider.started(session.control(provider.ready()))
         except BaseException:
@@ -54,7 +55,8 @@ class InProcessLink:
                 self._trouble.__cause__ = self._trouble.__cause__ or error
                 continue
             self._frames += [(provider.name, frame) for frame in provider.frames()]
-            self._checkpoints += [(provider.name, one) for one in provider.checkpoints()]
+            for piece in provider.pieces():
+                self._session.piece(provider.name, piece)
             if answer is None:
                 self._session.control(provider.bye())
             else:
@@ -76,11 +78,6 @@ class InProcessLink:
     def frames(self) -> list[tuple[str, Sent]]:
         """Take the frames of the last answers."""
         taken, self._frames = self._frames, []
-        return taken
-
-    def checkpoints(self) -> list[tuple[str, bytes]]:
-        """Take the checkpoints of the last answers."""
-        taken, self._checkpoints = self._checkpoints, []
         return taken
 
     def listeners(self, topics: Sequence[str], description: bytes) -> None:

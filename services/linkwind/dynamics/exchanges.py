@@ -126,10 +126,9 @@ class Exchanges:
 
     def _take_shown(self) -> None:
         """Write frames and checkpoints that came with the last answers: after all of these, in one order."""
-        for provider, payload in sorted(self._link.checkpoints(), key=lambda sent: sent[0]):
-            checkpoint = self._session.checkpoint(provider, payload)
-            if checkpoint is not None:
-                self._log.checkpoint(provider, payload, checkpoint.time_ns)
+        for provider, checkpoint in sorted(self._session.checkpoints(), key=lambda taken: taken[0]):
+            for piece in checkpoint.pieces(self._session.run, provider):
+                self._log.checkpoint(provider, piece, checkpoint.time_ns)
         for provider, sent in sorted(self._link.frames(), key=lambda shown: shown[0]):
             frame = self._session.frame(provider, sent)
             if frame is not None:

@@ -200,7 +200,7 @@ class LogWriter:
         self.copy(frames.topic_of(frame, provider), frames.encode(frame), frame.time_ns)
 
     def checkpoint(self, provider: str, payload: bytes, time_ns: int) -> None:
-        """Log an encoded Checkpoint of ``provider``, at the checkpoint's own time."""
+        """Log a piece of a checkpoint of ``provider``, at the checkpoint's own time."""
         self.copy(contents.CHECKPOINT + provider, payload, time_ns)
 
     def copy(self, topic: str, payload: bytes, time_ns: int) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from linkwind import checkpoints, frames
-from linkwind.checkpoints import Checkpoint
+from linkwind.checkpoints import Checkpoint, Joining
 from linkwind.errors import ProtocolError, SimulationError
 from linkwind.frames import Frame, Sent
 from linkwind.messages import MotionMessage
@@ -37,6 +37,7 @@ class DynamicsSession(HandShake):
         self.motion = MotionMessage(run, n)
         self._posted = b""
         self._waiting = 0
+        self._checkpoints: list[tuple[str, Checkpoint]] = []
         self._numbers = np.zeros(42 * n)
         self._wrench = self._numbers[: 6 * n].reshape(n, 6)
         self._force, self._torque = self._wrench[:, :3], self._wrench[:, 3:]
@@ -138,21 +139,34 @@ class DynamicsSession(HandShake):
         known.frames = number
         return frame
 
-    def checkpoint(self, provider: str, payload: bytes) -> Checkpoint | None:
-        """Take a checkpoint; None if a provider that came back has sent it again.
+    def piece(self, provider: str, payload: bytes) -> None:
+        """Take a piece of a checkpoint.
 
         Raises:
-            ProtocolError: unknown provider, not a checkpoint of this run, or one before it was lost.
+            ProtocolError: unknown provider, not the next piece, or a checkpoint was lost before it.
+            ParticipantError: there is no room for the checkpoint.
         """
         known = self._sender(provider, "checkpoint")
-        number, checkpoint = checkpoints.decode(payload, self.run, provider)
-        if known.losses and number <= known.checkpoints:
-            return None
-        self._check_number("checkpoint", provider, known.checkpoints + 1, number)
-        known.checkpoints = number
+        if not known.ready:
+            return  # the rest of what one sent that is lost
+        if known.joining is None:
+            known.joining = Joining(checkpoints.named(provider))
+        checkpoint = known.joining.add(checkpoints.decode(payload, self.run, provider))
+        if checkpoint is None:
+            return
+        known.joining = None
+        if known.losses and checkpoint.number <= known.checkpoints:
+            return  # it has come back, and sends it again
+        self._check_number("checkpoint", provider, known.checkpoints + 1, checkpoint.number)
+        known.checkpoints = checkpoint.number
         if known.past is not None:
-            known.past.save(number, checkpoint, known.frames)
-        return checkpoint
+            known.past.save(checkpoint, known.frames)
+        self._checkpoints.append((provider, checkpoint))
+
+    def checkpoints(self) -> list[tuple[str, Checkpoint]]:
+        """Take the checkpoints of which every piece has come, each with its provider."""
+        taken, self._checkpoints = self._checkpoints, []
+        return taken
 
     def _sender(self, provider: str, what: str) -> Participant:
         known = self.participants.get(provider)

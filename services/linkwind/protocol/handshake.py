@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from linkwind.checkpoints import PIECE, Checkpoint, Joining
 from linkwind.errors import LinkwindError, LostError, MismatchError, RefusedError
 from linkwind.messages import KINDS, WrenchMessage
 from linkwind.protocol.control import PROGRAM, Control, fault_error, parse, refuse
@@ -36,6 +37,7 @@ class Participant:
     frames: int = 0  # taken so far
     shown: int = 0  # sent, as Bye says
     checkpoints: int = 0  # taken so far
+    joining: Joining | None = None  # the next one, while its pieces come
     saved: int = 0  # sent, as Bye says
     losses: int = 0
     replaceable: bool = False  # whether who has started it ends it when it counts as lost, and starts another
@@ -56,16 +58,18 @@ class Course:
     Attributes:
         checkpoint_every: steps from one checkpoint to the next; 0 for none.
         start: the step that the providers begin after, with ``states``; -1 for the beginning.
-        states: what each provider had saved then, and the number of that checkpoint.
+        states: the checkpoint of that step of each provider.
         changes: scenarios (JSON) that count from the motion of step + 1 on, by step.
         recovery: whether a provider that was lost may come back; then there have to be checkpoints.
+        piece: of a checkpoint in one message to a provider, at most [bytes].
     """
 
     checkpoint_every: int = 0
     start: int = -1
-    states: Mapping[str, tuple[int, bytes]] = field(default_factory=dict)
+    states: Mapping[str, Checkpoint] = field(default_factory=dict)
     changes: Mapping[int, str] = field(default_factory=dict)
     recovery: bool = False
+    piece: int = PIECE
 
 
 class HandShake:
@@ -124,7 +128,7 @@ class HandShake:
                 the transport knows who asks.
         """
         try:
-            message = parse(request, "hello", "ready", "bye", "fault", "order")
+            message = parse(request, "hello", "fetch", "ready", "bye", "fault", "order")
             self._check_asker(message, asker)
             reply = getattr(self, "_on_" + message.WhichOneof("body"))(message)
         except LinkwindError as error:
@@ -177,20 +181,18 @@ class HandShake:
     def _begin(self, known: Participant) -> None:
         """Let a provider begin where the run does."""
         course = self.course
-        number, state = course.states[known.name] if course.start >= 0 else (0, b"")
-        known.checkpoints = max(0, number - 1)
+        begin = course.states[known.name] if course.start >= 0 else None
+        known.checkpoints = 0 if begin is None else begin.number - 1
         if course.recovery:
-            known.past = Past(course.checkpoint_every, course.start, number, state)
+            known.past = Past(course.checkpoint_every, begin)
 
     def _course(self, known: Participant) -> dict[str, Any]:
         course, past = self.course, known.past
         changes = [{"step": step, "scenario_json": text} for step, text in sorted(course.changes.items())]
         body: dict[str, Any] = {"checkpoint_every": course.checkpoint_every, "changes": changes}
-        if past is not None and past.step >= 0:
-            body["resume"] = {"step": past.step, "state": past.state, "number": past.number}
-        elif course.start >= 0:
-            number, state = course.states[known.name]
-            body["resume"] = {"step": course.start, "state": state, "number": number}
+        begin = self._begins_from(known)
+        if begin is not None:
+            body["resume"] = begin.piece(self.run, known.name, 0, course.piece)
         if known.losses and past is not None:
             body["catch_up"] = {
                 "motions": [answered.motion for answered in past.answers],
@@ -199,6 +201,26 @@ class HandShake:
                 "checkpoints_taken": known.checkpoints,
             }
         return body
+
+    def _begins_from(self, known: Participant) -> Checkpoint | None:
+        if known.past is not None:
+            return known.past.checkpoint
+        return self.course.states[known.name] if self.course.start >= 0 else None
+
+    def _on_fetch(self, message: Any) -> Any:
+        fetch = message.fetch
+        known = self._after_hello("Fetch", fetch)
+        begin = self._begins_from(known)
+        if begin is None or fetch.offset >= begin.state.size:
+            size = 0 if begin is None else begin.state.size
+            raise RefusedError(f'"{fetch.name}": Fetch: expected an offset below {size}; got {fetch.offset}')
+        return Control(checkpoint=begin.piece(self.run, known.name, fetch.offset, self.course.piece))
+
+    def _after_hello(self, what: str, body: Any) -> Participant:
+        known = self.participants.get(body.name)
+        if known is None or not known.instance or known.instance != body.instance:
+            raise RefusedError(f'"{body.name}": {what} without Hello')
+        return known
 
     def seen(self, name: str, present: bool) -> None:
         """Take note that a process of a provider is on the bus, or is gone without having taken part."""
@@ -217,14 +239,12 @@ class HandShake:
         if known.payload and (known.past is None or known.past.torn):
             why = "sent no checkpoint when one was due" if known.rollback else "cannot save its memory"
             raise LostError(f'"{name}" cannot come back (bus.recovery): it {why}')
-        known.ready, known.here, known.instance = False, False, ""
+        known.ready, known.here, known.instance, known.joining = False, False, "", None
         known.losses += 1
 
     def _on_ready(self, message: Any) -> Any:
         ready = message.ready
-        known = self.participants.get(ready.name)
-        if known is None or not known.instance or known.instance != ready.instance:
-            raise RefusedError(f'"{ready.name}": Ready without Hello')
+        known = self._after_hello("Ready", ready)
         n = len(known.bodies)
         if ready.response_size not in (0, 36 * n, 36 * n * n):
             self.failure = RefusedError(

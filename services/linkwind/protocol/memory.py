@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 
-from linkwind.checkpoints import Checkpoint
+from linkwind.checkpoints import Checkpoint, State
 from linkwind.errors import ProtocolError, SimulationError
 from linkwind.spatial import Motion, Wrench
 
@@ -50,30 +50,31 @@ class Memory:
         saved: checkpoints so far.
     """
 
-    def __init__(self, welcome: Any, name: str, build: Callable[[str, str], Model]) -> None:
-        """Build the model that the message Welcome asks for.
+    def __init__(
+        self, welcome: Any, name: str, build: Callable[[str, str], Model], begin: Checkpoint | None
+    ) -> None:
+        """Build the model that the message Welcome asks for; it goes on from a checkpoint, if there is one.
 
         Raises:
             InputError: the scenario does not make a model.
-            ProtocolError: the memory in the welcome is not one of that model.
+            ProtocolError: the checkpoint is not one of that model.
         """
-        resume = welcome.resume if welcome.HasField("resume") else None
-        self.start = -1 if resume is None else int(resume.step)
+        self.start = -1 if begin is None else begin.step
         self._name, self._run, self._build = name, welcome.run, build
         self._every = welcome.checkpoint_every
         self._changes = {int(change.step): change.scenario_json for change in welcome.changes}
         before = [step for step in self._changes if step < self.start]
         scenario = self._changes[max(before)] if before else welcome.scenario_json
         self.model = build(scenario, name)
-        if resume is not None:
+        if begin is not None:
             try:
-                self.model.restore(resume.state)
+                self.model.restore(begin.state.whole())
             except BaseException:
                 self.close()
                 raise
-        self._checkpoints: list[bytes] = []
+        self._checkpoints: list[Checkpoint] = []
         self._taken = int(welcome.catch_up.checkpoints_taken)
-        self.saved = 0 if resume is None else int(resume.number) - 1
+        self.saved = 0 if begin is None else begin.number - 1
 
     def committed(self, step: int, time_ns: int) -> None:
         """Do what is due after the commit of ``step``: save the memory, then change the scenario."""
@@ -91,8 +92,7 @@ class Memory:
             return
         self.saved += 1
         if self.saved > self._taken:
-            checkpoint = Checkpoint(step, time_ns, state)
-            self._checkpoints.append(checkpoint.encode(self._run, self._name, self.saved))
+            self._checkpoints.append(Checkpoint(self.saved, step, time_ns, State.of(state)))
 
     def _change(self, step: int, scenario_json: str) -> None:
         """Go on with a model of another scenario that has the memory of this one."""
@@ -113,10 +113,10 @@ class Memory:
             )
         changed.restore(state)
 
-    def checkpoints(self) -> list[bytes]:
-        """Take the checkpoints that were saved."""
-        taken, self._checkpoints = self._checkpoints, []
-        return taken
+    def pieces(self) -> Iterator[bytes]:
+        """Take the checkpoints that were saved, piece by piece."""
+        while self._checkpoints:
+            yield from self._checkpoints.pop(0).pieces(self._run, self._name)
 
     def close(self) -> None:
         """End what the model holds, such as a process of its own."""

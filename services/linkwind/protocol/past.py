@@ -21,37 +21,34 @@ class Past:
     """What the dynamics keeps of one provider; as long as checkpoints come, that stays small.
 
     Attributes:
-        step: of the checkpoint; -1 for the beginning.
-        number: of the checkpoint; 0 for the beginning.
-        state: what the provider had saved then.
+        checkpoint: the last one; None for the beginning.
         frames: that it had shown until then.
         answers: since then, in order.
         torn: whether a checkpoint did not come when it was due; then nothing is kept any more.
     """
 
-    def __init__(self, every: int, step: int = -1, number: int = 0, state: bytes = b"") -> None:
+    def __init__(self, every: int, checkpoint: Checkpoint | None = None) -> None:
         """Begin.
 
         Args:
             every: steps from one checkpoint to the next.
-            step: that the provider begins after.
-            number: of the checkpoint that it begins from.
-            state: in that checkpoint.
+            checkpoint: that the provider begins from; None for the beginning.
         """
         self._every = every
         self.frames = 0
         self.torn = False
         self.answers: list[Answered] = []
-        self._begin(step, number, state)
+        self._begin(checkpoint)
 
-    def _begin(self, step: int, number: int, state: bytes) -> None:
-        self.step, self.number, self.state = step, number, state
-        # A checkpoint comes with the first answer to the step behind its own, and is taken right after that.
-        self._due = (max(step, 0) // self._every + 1) * self._every + 1
+    def _begin(self, checkpoint: Checkpoint | None) -> None:
+        self.checkpoint = checkpoint
+        self._step = -1 if checkpoint is None else checkpoint.step
+        # A checkpoint comes with the first answer to the step behind its own.
+        self._due = (max(self._step, 0) // self._every + 1) * self._every + 1
 
     def add(self, step: int, motion: bytes, answer: bytes) -> None:
         """Keep what was answered; what comes from a log, from before the beginning, is left out."""
-        if self.torn or step <= self.step:
+        if self.torn or step <= self._step:
             return
         if step > self._due:
             self.torn = True
@@ -59,15 +56,9 @@ class Past:
             return
         self.answers.append(Answered(step, motion, hashlib.sha256(answer).digest()))
 
-    def save(self, number: int, checkpoint: Checkpoint, frames: int) -> None:
-        """Begin again at a checkpoint.
-
-        Args:
-            number: of the checkpoint.
-            checkpoint: of the provider.
-            frames: that the provider had shown when it made it.
-        """
-        self._begin(checkpoint.step, number, checkpoint.state)
+    def save(self, checkpoint: Checkpoint, frames: int) -> None:
+        """Begin again at a checkpoint of the provider; ``frames`` that it had shown when it made it."""
+        self._begin(checkpoint)
         self.frames = frames
         self.answers = [answered for answered in self.answers if answered.step > checkpoint.step]
 

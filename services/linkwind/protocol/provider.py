@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import logging
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from enum import Enum, auto
 from typing import Any
 
+from linkwind.checkpoints import Checkpoint, Joining
 from linkwind.errors import ProtocolError, RefusedError
 from linkwind.frames import Frame, Sent
 from linkwind.messages import KINDS, MotionMessage, WrenchMessage
@@ -49,6 +50,7 @@ class ProviderSession:
         self.at = (-1, 0)
         self._build = build
         self._memory: Memory | None = None
+        self._begin: Checkpoint | None = None
         self._frames: list[Sent] = []
         self._shown = 0
         self._taken = 0
@@ -71,16 +73,40 @@ class ProviderSession:
         Raises:
             RefusedError: the dynamics refuses, with its reason.
         """
-        message = parse(reply, "welcome", "refuse")
-        if message.WhichOneof("body") == "refuse":
-            raise RefusedError(f'the dynamics refused "{self.name}": {message.refuse.reason}')
-        welcome = message.welcome
+        welcome = self._granted(reply, "welcome").welcome
         self.run = welcome.run
         self._step_ns = welcome.step_ns
         self._bodies = list(welcome.provider_bodies)
         self._welcome = welcome
         self._motion = MotionMessage(self.run, len(welcome.bodies))
+        self._joining: Joining | None = None
+        if welcome.HasField("resume"):
+            self._joining = Joining(f'"{self.name}": checkpoint to go on from', in_memory=True)
+            self._join(welcome.resume)
+            welcome.resume.ClearField("state")
         self.state = ProviderState.WELCOME
+
+    def fetch(self) -> bytes | None:
+        """Return the message that asks for the next piece of what to go on from; None if all are here."""
+        if self._joining is None:
+            return None
+        body = {"name": self.name, "instance": self.instance, "offset": self._joining.next}
+        return bytes(Control(fetch=body).SerializeToString())
+
+    def fetched(self, reply: bytes) -> None:
+        """Take the answer to fetch.
+
+        Raises:
+            RefusedError: the dynamics does not have that piece.
+            ProtocolError: it is another piece, or the whole is damaged.
+        """
+        self._join(self._granted(reply, "checkpoint").checkpoint)
+
+    def _join(self, piece: Any) -> None:
+        assert self._joining is not None
+        self._begin = self._joining.add(piece)
+        if self._begin is not None:
+            self._joining = None
 
     def build(self) -> None:
         """Build the force model from the scenario of the welcome, with the memory that comes with it.
@@ -89,7 +115,8 @@ class ProviderSession:
             InputError: the scenario does not make a model.
             ProtocolError: the memory is not one of that model.
         """
-        self._memory = Memory(self._welcome, self.name, self._build)
+        self._memory = Memory(self._welcome, self.name, self._build, self._begin)
+        self._begin = None
         self._use(self._memory.model)
         self.at = (self._memory.start, 0)
         can = self._model.capabilities
@@ -148,10 +175,15 @@ class ProviderSession:
 
     def started(self, reply: bytes) -> None:
         """Take the answer to ready."""
-        message = parse(reply, "start", "refuse")
+        self._granted(reply, "start")
+        self.state = ProviderState.RUNNING
+
+    def _granted(self, reply: bytes, what: str) -> Any:
+        """Return a control message of the dynamics that is ``what`` was asked for, and no refusal."""
+        message = parse(reply, what, "refuse")
         if message.WhichOneof("body") == "refuse":
             raise RefusedError(f'the dynamics refused "{self.name}": {message.refuse.reason}')
-        self.state = ProviderState.RUNNING
+        return message
 
     def answer(self, payload: bytes) -> bytes | None:
         """Take a motion message, return the wrench; None when there is nothing (more) to say.
@@ -228,9 +260,9 @@ class ProviderSession:
         if self._memory.model is not self._model:
             self._use(self._memory.model)
 
-    def checkpoints(self) -> list[bytes]:
-        """Take the checkpoints that the last :meth:`answer` brought: to be sent before the answer itself."""
-        return [] if self._memory is None else self._memory.checkpoints()
+    def pieces(self) -> Iterator[bytes]:
+        """Take the checkpoints of the last :meth:`answer`, to be sent piece by piece before that itself."""
+        return iter(()) if self._memory is None else self._memory.pieces()
 
     def bye(self) -> bytes:
         """Return the answer to the final motion."""

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from linkwind import checkpoints
+from linkwind.checkpoints import Checkpoint, Joining, Sequence
 from linkwind.errors import LogError, ProtocolError
 from linkwind.log.contents import CHECKPOINT, FRAMES, MOTION, TIMING, WRENCH
 from linkwind.log.reader import Log
@@ -122,27 +124,54 @@ def last_step(log: Log, step_ns: int) -> int:
 
 
 def checkpoint_steps(log: Log, step_ns: int) -> list[int]:
-    """Return the steps, in order, at which the log has a checkpoint of every provider."""
-    providers = log.provider_bodies
+    """Return the steps, in order, at which the log has a checkpoint of every provider with all its pieces.
+
+    Raises:
+        LogError: a piece is none.
+    """
     found: dict[int, set[str]] = {}
-    for channel, _, time_ns, _ in log.messages(*(CHECKPOINT + name for name in providers)):
-        found.setdefault(time_ns // step_ns, set()).add(log.channels[channel].topic)
-    return sorted(step for step, topics in found.items() if len(topics) == len(providers))
+    arriving: dict[str, Sequence] = {}
+    for provider, time_ns, piece in _pieces(log):
+        if not piece.offset:
+            arriving[provider] = Sequence(checkpoints.named(provider))
+        with suppress(ProtocolError, KeyError):  # behind a hole, or a beginning that is not there
+            if arriving[provider].take(piece):
+                found.setdefault(time_ns // step_ns, set()).add(provider)
+    return sorted(step for step, whole in found.items() if len(whole) == len(log.provider_bodies))
 
 
-def states_at(log: Log, step: int, step_ns: int) -> dict[str, tuple[int, bytes]]:
-    """Return the number of each provider's checkpoint at a step, and what it had saved.
+def states_at(log: Log, step: int, step_ns: int) -> dict[str, Checkpoint]:
+    """Return each provider's checkpoint of a step that is among :func:`checkpoint_steps`.
 
     Raises:
         LogError: a checkpoint is damaged.
     """
-    states = {}
-    for channel, _, time_ns, payload in log.messages(*(CHECKPOINT + name for name in log.provider_bodies)):
-        if time_ns == step * step_ns:
-            provider = log.channels[channel].topic.removeprefix(CHECKPOINT)
-            try:
-                number, checkpoint = checkpoints.decode(payload, log.run, provider)
-                states[provider] = number, checkpoint.state
-            except ProtocolError as error:
-                raise LogError(f"{log.path}: {CHECKPOINT}{provider}: step {step}: {error}.") from error
+    states: dict[str, Checkpoint] = {}
+    joining: dict[str, Joining] = {}
+    for provider, time_ns, piece in _pieces(log, step * step_ns):
+        if time_ns != step * step_ns:
+            continue
+        if not piece.offset:
+            joining[provider] = Joining(f"{log.path}: {CHECKPOINT}{provider}: step {step}")
+        try:
+            whole = joining[provider].add(piece)
+        except ProtocolError as error:
+            raise LogError(str(error)) from error
+        if whole is not None:
+            states[provider] = whole
     return states
+
+
+def _pieces(log: Log, start_ns: int = 0) -> Iterator[tuple[str, int, Any]]:
+    """Yield provider, simulation time [ns] and message of the pieces of all checkpoints, in order.
+
+    Those before ``start_ns`` may be left out.
+    """
+    topics = [CHECKPOINT + name for name in log.provider_bodies]
+    for channel, _, time_ns, payload in log.messages(*topics, start_ns=start_ns):
+        topic = log.channels[channel].topic
+        provider = topic.removeprefix(CHECKPOINT)
+        try:
+            yield provider, time_ns, checkpoints.decode(payload, log.run, provider)
+        except ProtocolError as error:
+            raise LogError(f"{log.path}: {topic}: {error}.") from error

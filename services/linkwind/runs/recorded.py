@@ -160,10 +160,6 @@ class RecordedWrenches:
         """Nobody is there to show any."""
         return []
 
-    def checkpoints(self) -> list[tuple[str, bytes]]:
-        """Nobody is there to keep any."""
-        return []
-
     def listeners(self, topics: Sequence[str], description: bytes) -> None:
         """Nobody else is there."""
 

@@ -258,7 +258,7 @@ def as_exchanged(point: Sequence[Sent]) -> Iterator[Sent]:
 
 def _key(topic: str) -> str:
     """Return the key of a topic below that of the run."""
-    return f"/observe{topic}" if topic.startswith((*FRAMES, CHECKPOINT)) else topic
+    return f"/observe{topic}" if topic.startswith(FRAMES) else topic
 
 
 def _records(log: Log, *names: str) -> dict[str, dict[str, str]]:

@@ -55,7 +55,7 @@ class SplicedLink:
         self._behind: Exchange | None = None  # the recorded exchange that the providers do again
         self._live = False
         self.wait, self.repeat, self.fault, self.close = link.wait, link.repeat, link.fault, link.close
-        self.frames, self.checkpoints, self.listeners = link.frames, link.checkpoints, link.listeners
+        self.frames, self.listeners = link.frames, link.listeners
 
     def post(self, motion: bytes) -> None:
         """Send a motion message to the providers if they have begun; get the recorded answers ready."""

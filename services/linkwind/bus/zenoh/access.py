@@ -25,6 +25,7 @@ MESSAGES = (
     "declare_liveliness_subscriber",
     "liveliness_query",
 )
+SAID = ("wrench", "checkpoint", "observe/*")
 PRESENCE = ("declare_liveliness_subscriber", "liveliness_query")
 
 
@@ -55,7 +56,7 @@ def of_hub(providers: Iterable[str], trusted: str) -> dict[str, Any]:
     ]
     for name in providers:
         rules += [
-            _rule(f"{name} says", ["put"], ["ingress"], f"{RUN}/wrench/{name}", f"{RUN}/observe/*/{name}"),
+            _rule(f"{name} says", ["put"], ["ingress"], *(f"{RUN}/{key}/{name}" for key in SAID)),
             _rule(f"{name} asks", ["query"], ["ingress"], f"{RUN}/control/{name}"),
             _rule(f"{name} is there", ["liveliness_token"], ["ingress"], f"{RUN}/alive/{name}"),
         ]

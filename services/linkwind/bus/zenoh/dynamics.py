@@ -11,10 +11,17 @@ from typing import Protocol
 import zenoh
 from zenoh.handlers import FifoChannel
 
-from linkwind.bus.base import CHECKPOINT, PREFIX
+from linkwind.bus.base import PREFIX
 from linkwind.bus.zenoh.access import of_hub
 from linkwind.bus.zenoh.endpoint import Endpoint
-from linkwind.bus.zenoh.session import DYNAMICS, LEASE, Security, key_segment
+from linkwind.bus.zenoh.session import (
+    DYNAMICS,
+    LARGEST,
+    LARGEST_PIECE,
+    LEASE,
+    Security,
+    key_segment,
+)
 from linkwind.bus.zenoh.stream import ZenohLogStream
 from linkwind.credentials import ROUTER, Identity
 from linkwind.errors import AnswerTimeoutError, LinkwindError, LostError
@@ -23,7 +30,10 @@ from linkwind.frames import Sent
 # s that the dynamics looks for an answer before it sleeps: a processor that is awake answers two to four
 # times faster. Only one side may do so, and only if it does not take the other's processor away.
 SPIN = 200e-6 if len(os.sched_getaffinity(0)) > 1 else 0.0
-FRAMES = 64  # and checkpoints, that may wait for the dynamics, which takes them at every exchange
+FRAMES = 64  # that may wait for the dynamics, which takes them at every exchange
+# Pieces of checkpoints that may wait: as much memory as the largest message. The dynamics takes them while it
+# waits for an answer, at every tick at least; while there are so many, the provider waits, for 5 s (zenoh's).
+PIECES = LARGEST // LARGEST_PIECE
 PAUSE = 0.005  # s between two looks while providers come and go
 FIRST_RESEND = 0.5  # s; the first motion to a provider may be lost while declarations still travel
 
@@ -36,6 +46,7 @@ class Exchanging(Protocol):
 
     def control(self, request: bytes, asker: str) -> bytes: ...
     def refusal(self) -> bytes: ...
+    def piece(self, provider: str, payload: bytes) -> None: ...
     def seen(self, name: str, present: bool) -> None: ...
     def where(self) -> str: ...
     @property
@@ -74,7 +85,7 @@ class ZenohDynamicsLink(Endpoint):
         base = f"{PREFIX}/{key_segment(session.run, '--run')}"
         security = Security(identity, of_hub(session.providers, ROUTER)) if identity else None
         bodies = max(map(len, session.providers.values()), default=0)
-        limits = {f"{base}/wrench/*": largest_wrench(bodies)}
+        limits = {f"{base}/wrench/*": largest_wrench(bodies), f"{base}/checkpoint/*": LARGEST_PIECE}
         super().__init__(listen, connect, DYNAMICS, security, limits)
         self._exchanging = session
         self._timeout, self._first = timeout, max(timeout, first)
@@ -84,10 +95,9 @@ class ZenohDynamicsLink(Endpoint):
         self._unsure_motion = b""
         self._resend_at: float | None = None
         self._asking = threading.Lock()
-        # Before the wrenches' own: whoever can send a wrench can send a frame.
+        # Before the wrenches' own: whoever can send a wrench can send a frame, and a checkpoint.
         self._observed = self._session.declare_subscriber(f"{base}/observe/*/*", FifoChannel(FRAMES))
-        self._frames: list[tuple[str, Sent]] = []
-        self._checkpoints: list[tuple[str, bytes]] = []
+        self._pieces = self._session.declare_subscriber(f"{base}/checkpoint/*", FifoChannel(PIECES))
         self._join(f"{base}/wrench/*", f"{base}/motion", session.run, "dynamics")
         self._control = self._session.declare_queryable(f"{base}/control/*", self._on_control, complete=True)
         # After the other: whoever has seen this one has seen that, too, unless it may not.
@@ -135,8 +145,10 @@ class ZenohDynamicsLink(Endpoint):
                 return False
             # Not a condition variable: a signal in the middle of one leaves it in pieces.
             time.sleep(PAUSE)
+            self._take_pieces()
             self._doubt.check()
             poll()
+        self._take_pieces()
         return True
 
     def post(self, motion: bytes) -> None:
@@ -166,10 +178,13 @@ class ZenohDynamicsLink(Endpoint):
     def receive(self) -> tuple[str, bytes]:
         """Return the next wrench message and its provider; see :class:`~linkwind.bus.base.DynamicsLink`."""
         # A provider's time to answer runs while the dynamics waits, not while it writes its log; it does not
-        # begin again when something else comes: an old answer, or that of another provider.
+        # begin again when something else comes: an old answer, or that of another provider. It does with each
+        # piece of a checkpoint: a large one takes its time.
         since = time.monotonic() - self._waited
         while self._waited < self._patience:
             sample = self._receive(SPIN)
+            if self._take_pieces():
+                since = time.monotonic()
             self._waited = time.monotonic() - since
             if sample is not None:
                 return _named(sample)
@@ -188,25 +203,22 @@ class ZenohDynamicsLink(Endpoint):
 
         One session sends frame and wrench over one link, with one priority: zenoh keeps their order.
         """
-        self._observe()
-        taken, self._frames = self._frames, []
-        return taken
-
-    def checkpoints(self) -> list[tuple[str, bytes]]:
-        """Take the checkpoints that have come; see :meth:`frames`."""
-        self._observe()
-        taken, self._checkpoints = self._checkpoints, []
-        return taken
-
-    def _observe(self) -> None:
-        """Take what has come, without waiting."""
+        frames = []
         while (sample := self._observed.try_recv()) is not None:
             name, payload = _named(sample)
-            kind = str(sample.key_expr).rsplit("/", 2)[1]
-            if kind == CHECKPOINT:
-                self._checkpoints.append((name, payload))
-            else:
-                self._frames.append((name, Sent(kind, payload)))
+            frames.append((name, Sent(str(sample.key_expr).rsplit("/", 2)[1], payload)))
+        return frames
+
+    def _take_pieces(self) -> bool:
+        """Give the session what has come of checkpoints, without waiting; tell whether there was anything.
+
+        They come in order, like :meth:`frames`.
+        """
+        came = False
+        while (sample := self._pieces.try_recv()) is not None:
+            self._exchanging.piece(*_named(sample))
+            came = True
+        return came
 
 
 def largest_wrench(bodies: int) -> int:

@@ -8,23 +8,15 @@ from typing import Any
 
 import zenoh
 
-from linkwind.bus.base import CHECKPOINT, PREFIX
+from linkwind.bus.base import PREFIX
 from linkwind.bus.zenoh.access import of_guest
 from linkwind.bus.zenoh.endpoint import Endpoint
-from linkwind.bus.zenoh.session import (
-    LARGEST,
-    LARGEST_MOTION,
-    LARGEST_REQUEST,
-    LEASE,
-    PROVIDER,
-    Security,
-    key_segment,
-)
+from linkwind.bus.zenoh.session import LARGEST_MOTION, LEASE, PROVIDER, Security, key_segment
 from linkwind.credentials import Identity
-from linkwind.errors import LostError, ParticipantError, SimulationError
+from linkwind.errors import LostError, ParticipantError
 from linkwind.frames import KINDS, Sent
 
-ANSWER = 5.0  # s for the answer to a request: a Welcome may carry the memory of a large model
+ANSWER = 5.0  # s for the answer to a request, which may carry a piece of a checkpoint
 
 
 class ZenohProviderLink(Endpoint):
@@ -92,13 +84,12 @@ class ZenohProviderLink(Endpoint):
         self._run = key_segment(run, "--run")
         self._joined_at = time.monotonic()
         base, name = f"{PREFIX}/{run}", self._name
-        self._observed = {
-            kind: self._session.declare_publisher(
-                f"{base}/observe/{kind}/{name}", congestion_control=zenoh.CongestionControl.BLOCK
-            )
-            for kind in (*KINDS, CHECKPOINT)
-        }
+        self._observed = {kind: self._publisher(f"{base}/observe/{kind}/{name}") for kind in KINDS}
+        self._kept = self._publisher(f"{base}/checkpoint/{name}")
         self._join(f"{base}/motion", f"{base}/wrench/{name}", run, name)
+
+    def _publisher(self, key: str) -> zenoh.Publisher:
+        return self._session.declare_publisher(key, congestion_control=zenoh.CongestionControl.BLOCK)
 
     def _seen(self, name: str, present: bool) -> None:
         if name == "dynamics":
@@ -123,18 +114,9 @@ class ZenohProviderLink(Endpoint):
         """Send a frame to the dynamics."""
         self._observed[frame.kind].put(frame.payload)
 
-    def keep(self, checkpoint: bytes) -> None:
-        """Send a checkpoint to the dynamics.
-
-        Raises:
-            SimulationError: it is too large for the bus.
-        """
-        if len(checkpoint) > LARGEST - LARGEST_REQUEST:
-            raise SimulationError(
-                f"checkpoint: expected at most {LARGEST / 1e6:.0f} MB; got {len(checkpoint) / 1e6:.0f} MB. "
-                "Use a smaller model, or log.checkpoint_every = 0 and bus.recovery = 0."
-            )
-        self._observed[CHECKPOINT].put(checkpoint)
+    def keep(self, piece: bytes) -> None:
+        """Send a piece of a checkpoint to the dynamics."""
+        self._kept.put(piece)
 
     def reply(self, wrench: bytes) -> None:
         """Send a wrench message to the dynamics."""

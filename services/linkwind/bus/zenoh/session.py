@@ -15,6 +15,7 @@ from typing import Any
 
 import zenoh
 
+from linkwind.checkpoints import PIECE
 from linkwind.credentials import Identity
 from linkwind.errors import InputError
 
@@ -24,8 +25,9 @@ LAST_PORT = 65535
 LEASE = 1.0  # s without a sign of life after which a participant counts as lost
 
 # bytes of a message, which wait in memory until it is whole; what is larger is dropped
-LARGEST = 2**28  # of any: the memory of a flow of 7 million cells, of one in space of half as many
-LARGEST_REQUEST = 2**16  # of a control request; the answer may be as large as a model's memory
+LARGEST = 2**28  # of any
+LARGEST_REQUEST = 2**16  # of a control request; the answer may have a piece of a checkpoint
+LARGEST_PIECE = PIECE + 2**16
 LARGEST_FAULT = 2**16
 LARGEST_MOTION = 2**24  # 30,000 bodies; a provider does not know how many there are before it has joined
 

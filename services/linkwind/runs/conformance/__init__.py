@@ -19,6 +19,7 @@ from linkwind.runs.conformance.life import Answer, Life, Provider
 from linkwind.scenario import Scenario
 
 STEPS, EVERY = 10, 3  # of a life; from one checkpoint to the next
+PIECES = 3  # or one more, in which it gets its checkpoint back
 LEAVES = 5.0  # s for a provider to leave a run that is over
 
 CHECKS = {
@@ -30,7 +31,7 @@ CHECKS = {
     "iterations": "goes back to the start of the step: the same trial state, the same wrench",
     "checkpoints": f"sends its memory after every {EVERY}rd step",
     "goodbye": "commits the last state, says Bye, with the number of frames and checkpoints",
-    "goes on": "from its own checkpoint, to the same wrenches",
+    "goes on": "from its own checkpoint, in several pieces, to the same wrenches",
     "comes back": "killed and started again, it catches up and answers the same",
     "lost message": "says Fault",
     "end of the run": f"leaves within {LEAVES:g} s of a Fault",
@@ -205,8 +206,9 @@ def _resumed(provider: Provider, run: str, findings: Findings) -> None:
     if not findings.checkpoints:
         findings.leave_out("goes on", "it has sent no checkpoint")
         return
-    number, checkpoint = len(findings.checkpoints) - 1, findings.checkpoints[-2]
-    course = Course(EVERY, checkpoint.step, {provider.name: (number, checkpoint.state)})
+    checkpoint = findings.checkpoints[-2]
+    piece = max(1, checkpoint.state.size // PIECES)
+    course = Course(EVERY, checkpoint.step, {provider.name: checkpoint}, piece=piece)
     with findings.check("goes on"), Life(provider, run, course, STEPS) as life:
         life.await_ready()
         _answer_as_before(life, range(checkpoint.step + 1, STEPS + 1), findings)

@@ -178,8 +178,7 @@ class Life:
     def _take_shown(self) -> None:
         for name, sent in self.link.frames():
             self.session.frame(name, sent)
-        found = (self.session.checkpoint(name, payload) for name, payload in self.link.checkpoints())
-        self.checkpoints += [checkpoint for checkpoint in found if checkpoint is not None]
+        self.checkpoints += [checkpoint for _, checkpoint in self.session.checkpoints()]
 
     def goodbye(self, last: int) -> None:
         """Send the last motion, wait for Bye.
