@@ -23,6 +23,7 @@ SLOW = (
     "tests/runs/test_conformance.py::test_what_is_wrong_is_found",
     "tests/runs/test_reproduce.py::test_the_paper",
     "tests/faults/test_killed_and_resumed.py",
+    "tests/faults/test_large_checkpoints.py",
     "tests/faults/test_processes.py::test_dynamics_lost_ends_the_provider_and_leaves_a_readable_log[stopped",
     "tests/faults/test_restarted.py",
     "tests/faults/test_recovery.py::test_a_cut_network",

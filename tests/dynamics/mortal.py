@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 
+from linkwind.checkpoints import PIECE
 from linkwind.errors import LostError, RefusedError
 from linkwind.protocol import DynamicsSession, ProviderSession, ProviderState
 
@@ -22,9 +24,11 @@ class MortalLink:
         moments: at which each provider could have died so far: between any two things that others can see.
         lives: processes of each provider so far.
         told: how often a loss is told: one whose lease is over may be back for a moment before it ends.
+        piece: bytes of a checkpoint that a provider gets back at once.
     """
 
     told = 1
+    piece = PIECE
 
     def __init__(
         self, session: DynamicsSession, make: Make, deaths: Mapping[str, Collection[int]], limit: int = 1000
@@ -39,6 +43,7 @@ class MortalLink:
         """
         self.moments: Counter[str] = Counter()
         self.lives: Counter[str] = Counter()
+        session.course = replace(session.course, piece=self.piece)
         self._session, self._make, self._deaths, self._limit = session, make, deaths, limit
         self._alive: dict[str, ProviderSession] = {}
         self._gone: set[str] = set()

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from linkwind import aero
+from linkwind import aero, checkpoints
 from linkwind.aero.base import Capabilities
 from linkwind.aero.service import session as provider_session
 from linkwind.dynamics.service import DynamicsService
@@ -227,6 +227,18 @@ def test_a_loss_that_is_told_again_is_the_same(tmp_path: Path, monkeypatch: pyte
     for moment in range(2, link.moments["left"], 7):
         done, disturbed = fly(scenario(), tmp_path / str(moment), {"left": {moment}})
         assert disturbed.lives["left"] == 2
+        check_same(done, undisturbed)
+
+
+def test_a_death_between_two_pieces_of_a_checkpoint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """There, 24 bytes in 4 pieces, and back, in 3."""
+    monkeypatch.setattr(checkpoints, "PIECE", 7)
+    monkeypatch.setattr(MortalLink, "piece", 11)
+    what = scenario(end=0.013)
+    undisturbed, link = fly(what, tmp_path / "undisturbed", {})
+    assert open_log(undisturbed.log).topics["/checkpoint/left"] == 2 * 4
+    for moment in range(1, link.moments["left"] + 1):
+        done, _ = fly(what, tmp_path / str(moment), {"left": {moment, moment + 3}})
         check_same(done, undisturbed)
 
 

@@ -9,13 +9,14 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from linkwind import aero
+from linkwind import aero, checkpoints
 from linkwind.aero.base import Capabilities
 from linkwind.cli import app
 from linkwind.errors import FaultError, InputError, LogError, MismatchError, ScenarioError
 from linkwind.log import contents
 from linkwind.log.reader import open_log
 from linkwind.runs.diff import diff
+from linkwind.runs.record import checkpoint_steps
 from linkwind.runs.resume import Resumed, plan, resume
 from linkwind.runs.run import Outcome, run
 from linkwind.runs.verify import scenario_of, verify
@@ -26,6 +27,7 @@ from tests.fmi.scenes import SERVO
 from tests.runs.edit import rewrite
 
 STEPS, EVERY = 60, 10
+PIECE_9 = "/checkpoint/aero", 9  # the third of the second one
 FAST = ("two_link", "two_link_free", "two_link_field", "two_link_gust")
 
 
@@ -105,6 +107,33 @@ def test_from_every_checkpoint_and_beside_it(name: str, tmp_path: Path) -> None:
         check_same(done, whole)
 
 
+def test_cut_within_a_checkpoint_the_one_before_is_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It has 16 bytes, in 6 pieces."""
+    monkeypatch.setattr(checkpoints, "PIECE", 3)
+    whole = fly("two_link_field", tmp_path / "whole")
+    topics = [m.topic for m in open_log(whole.log).raw()]
+    pieces = [place for place, topic in enumerate(topics) if topic == "/checkpoint/aero"][:12]
+    assert pieces[6:] == list(range(pieces[6], pieces[6] + 6))
+    for there in range(7):
+        log = cut(whole.log, tmp_path / f"{there}.mcap", pieces[6] + there)
+        done = go_on(log, tmp_path / str(there))
+        assert (done.plan.last, done.plan.start) == (20, 20 if there == 6 else 10)
+        check_same(done, whole)
+
+
+def test_a_piece_that_is_lost_in_the_middle_of_a_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is behind it does not count."""
+    monkeypatch.setattr(checkpoints, "PIECE", 3)
+    whole = fly("two_link_field", tmp_path / "whole")
+    log = rewrite(whole.log, tmp_path / "hole.mcap", lambda t, n, p: None if (t, n) == PIECE_9 else p)
+    assert checkpoint_steps(open_log(log), 1_000_000) == [10, 30, 40, 50, 60]
+    done = go_on(log, tmp_path / "again")
+    assert (done.plan.last, done.plan.start) == (20, 10)
+    check_same(done, whole)
+
+
 def test_cut_between_two_coupling_iterations(tmp_path: Path) -> None:
     whole = fly("two_link", tmp_path / "whole", "coupling.scheme=implicit")
     motions = exchange_ends(whole.log)
@@ -139,7 +168,7 @@ def test_a_flow(step: str, tmp_path: Path) -> None:
         "aero.flow.cells=24",
     )
     whole = fly("two_link_flow", tmp_path / "whole", *settings)
-    assert open_log(whole.log).topics["/checkpoint/aero"] == 3
+    assert checkpoint_steps(open_log(whole.log), round(float(step) * 1e9)) == [10, 20, 30]
     for at in (5, 10, 14, 20, 30):
         check_same(go_on(whole.log, tmp_path / str(at), at), whole)
 

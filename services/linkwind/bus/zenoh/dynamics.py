@@ -14,14 +14,7 @@ from zenoh.handlers import FifoChannel
 from linkwind.bus.base import PREFIX
 from linkwind.bus.zenoh.access import of_hub
 from linkwind.bus.zenoh.endpoint import Endpoint
-from linkwind.bus.zenoh.session import (
-    DYNAMICS,
-    LARGEST,
-    LARGEST_PIECE,
-    LEASE,
-    Security,
-    key_segment,
-)
+from linkwind.bus.zenoh.session import DYNAMICS, LARGEST_PIECE, LEASE, Security, key_segment
 from linkwind.bus.zenoh.stream import ZenohLogStream
 from linkwind.credentials import ROUTER, Identity
 from linkwind.errors import AnswerTimeoutError, LinkwindError, LostError
@@ -31,9 +24,7 @@ from linkwind.frames import Sent
 # times faster. Only one side may do so, and only if it does not take the other's processor away.
 SPIN = 200e-6 if len(os.sched_getaffinity(0)) > 1 else 0.0
 FRAMES = 64  # that may wait for the dynamics, which takes them at every exchange
-# Pieces of checkpoints that may wait: as much memory as the largest message. The dynamics takes them while it
-# waits for an answer, at every tick at least; while there are so many, the provider waits, for 5 s (zenoh's).
-PIECES = LARGEST // LARGEST_PIECE
+PIECES = 64  # of checkpoints, that may wait; behind them the provider waits, up to 5 s (zenoh's)
 PAUSE = 0.005  # s between two looks while providers come and go
 FIRST_RESEND = 0.5  # s; the first motion to a provider may be lost while declarations still travel
 
