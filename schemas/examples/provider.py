@@ -3,8 +3,8 @@
     pip install eclipse-zenoh==1.10.2 protobuf
     python provider.py tcp/127.0.0.1:7447          # to: linkwind dynamics two_link
 
-It follows schemas/README.md from top to bottom. It remembers nothing, so it can go back, go on from a
-checkpoint and come back after it was killed with almost no work. linkwind conformance finds nothing wrong.
+It follows schemas/README.md from top to bottom. It remembers the last accepted state, of which it makes no
+use; put your memory there. linkwind conformance finds nothing wrong.
 A copy of it elsewhere needs --schema FILE: the compiled schema, linkwind/v1/linkwind.binpb.
 """
 
@@ -23,6 +23,7 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
 DRAG = 0.5  # N·s²/m²
 POINT = 1  # kind of the wrench: the value at t_{k+1}
+PIECE = 2**20  # bytes of a checkpoint in a message, at most
 
 beside = Path(__file__).parent.parent / "linkwind/v1/linkwind.binpb"
 parser = argparse.ArgumentParser(description="Drag on every body of a linkwind run.")
@@ -87,7 +88,7 @@ inbox = queue.SimpleQueue()
 
 def join():
     """Say Hello, learn what the run is, listen to it."""
-    global welcome, bodies, wrenches, checkpoints, held, saved, at, answer
+    global welcome, bodies, wrenches, checkpoints, held, start, saved, at, answer, memory
     hello = {
         "name": name,
         "schema_sha256": hashlib.sha256(descriptors).hexdigest(),
@@ -107,13 +108,25 @@ def join():
     )
     block = {"congestion_control": zenoh.CongestionControl.BLOCK}
     wrenches = session.declare_publisher(f"{base}/wrench/{name}", **block)
-    checkpoints = session.declare_publisher(f"{base}/observe/checkpoint/{name}", **block)
+    checkpoints = session.declare_publisher(f"{base}/checkpoint/{name}", **block)
     token = session.liveliness().declare_token(f"{base}/alive/{name}")
     held = motions, fault, left, token  # zenoh ends what nobody holds
     resumed = welcome.HasField("resume")
     start = welcome.resume.step if resumed else -1  # committed before the first motion
     saved = welcome.resume.number - 1 if resumed else 0
+    memory = fetch(welcome.resume) if resumed else b""
     at, answer = (start, 0), b""
+
+
+def fetch(first):
+    """Return the memory of which the dynamics has sent the first piece."""
+    whole = first.state
+    while len(whole) < first.size:
+        following = {"name": name, "instance": instance, "offset": len(whole)}
+        whole += request(welcome.run, fetch=following).checkpoint.state
+    if hashlib.sha256(whole).digest() != first.sha256:
+        sys.exit("the checkpoint to go on from was damaged on the way")
+    return whole
 
 
 # ---- the force model ----
@@ -143,24 +156,32 @@ class ProtocolError(Exception):
     """The dynamics did something else than the protocol says."""
 
 
-def commit(step):
-    """Take an accepted state: nothing to remember, but a checkpoint may be due."""
-    global saved
+def commit(step, accepted):
+    """Take an accepted state, then save the memory if that is due."""
+    global memory, saved
+    if step != start:
+        memory = accepted.SerializeToString(deterministic=True)
     if welcome.checkpoint_every and step and step % welcome.checkpoint_every == 0:
         saved += 1
         if saved > welcome.catch_up.checkpoints_taken:
-            nothing = hashlib.sha256(b"").digest()
-            time_ns = step * welcome.step_ns
-            message = Checkpoint(
-                run=welcome.run,
-                provider=name,
-                number=saved,
-                step=step,
-                time_ns=time_ns,
-                state=b"",
-                sha256=nothing,
-            )
-            checkpoints.put(message.SerializeToString())
+            keep(step)
+
+
+def keep(step):
+    """Send the memory, piece by piece."""
+    for offset in range(0, max(1, len(memory)), PIECE):
+        piece = Checkpoint(
+            run=welcome.run,
+            provider=name,
+            number=saved,
+            step=step,
+            time_ns=step * welcome.step_ns,
+            size=len(memory),
+            sha256=hashlib.sha256(memory).digest(),
+            offset=offset,
+            state=memory[offset : offset + PIECE],
+        )
+        checkpoints.put(piece.SerializeToString())
 
 
 def respond(payload):
@@ -168,7 +189,7 @@ def respond(payload):
     global at, answer
     motion = MotionStep.FromString(payload)
     if motion.final:
-        commit(motion.step)
+        commit(motion.step, motion.accepted)
         return None
     asked = (motion.step, motion.iteration)
     if asked < at:
@@ -177,7 +198,7 @@ def respond(payload):
         return answer
     if asked == (at[0] + 1, 0):
         if motion.step:
-            commit(motion.step - 1)
+            commit(motion.step - 1, motion.accepted)
     elif asked != (at[0], at[1] + 1):
         raise ProtocolError(f"expected step {at[0] + 1}; got {motion.step}: a motion was lost")
     at, answer = asked, wrench(motion)

@@ -33,6 +33,7 @@ MUTANTS = {
     "no number": ("-DRAG * hypot(*v) * component", "float('nan') * component", ["answers"]),
     "does not miss a motion": ("if asked == (at[0] + 1, 0):", "if asked[1] == 0:", ["lost message"]),
     "does not catch up": ('b"".join(again)', 'b""', ["comes back"]),
+    "does not fetch the rest": ("while len(whole) < first.size:", "while False:", ["goes on"]),
     "stays": ("lambda _: inbox.put(None))", "lambda _: None)", ["end of the run"]),
     "says nothing": ("request(welcome.run, ready=ready)", "time.sleep(1000)", ["hand-shake"]),
 }

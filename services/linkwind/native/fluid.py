@@ -90,15 +90,21 @@ class Fluid:
             raise ValueError("halve_step: expected a shear_rate other than 1 before; got 1. Use 0.999.")
 
     @property
+    def parts(self) -> list[bytes | memoryview]:
+        """What a state consists of: ω and stream, populations where they lie; ``force`` is not part of it."""
+        numbers = np.array([self.shear_rate, *self.stream], np.float32).tobytes()
+        return [numbers, *(direction.data for direction in self.populations)]
+
+    @property
     def state(self) -> bytes:
-        """The whole state between two steps: ω, stream and populations; ``force`` is not part of it.
+        """The whole state between two steps, :attr:`parts` in one.
 
         Setting it raises ValueError where the bytes are not of a lattice of this size.
         """
-        return np.array([self.shear_rate, *self.stream], np.float32).tobytes() + self.populations.tobytes()
+        return b"".join(self.parts)
 
     @state.setter
-    def state(self, value: bytes) -> None:
+    def state(self, value: bytes | memoryview) -> None:
         count = 1 + len(self.stream)
         expected = 4 * count + self.populations.nbytes
         if len(value) != expected:

@@ -140,9 +140,9 @@ class Flow:
             + motions.tobytes()
         )
         if not self._ahead:
-            return memory + self._fluid.save()
+            return self._fluid.save(memory)
         self._fluid.back()
-        blob = memory + self._fluid.save()
+        blob = self._fluid.save(memory)
         self._fluid.back()
         return blob
 
@@ -171,7 +171,7 @@ class Flow:
             self._begin(start)
         self._set_out(start)
         self._accepted = accepted
-        self._window.restore(blob[motions + 16 * each * n :])
+        self._window.restore(memoryview(blob)[motions + 16 * each * n :])
         self._substeps = round(self._h / self._window.step)
         self._measure()
 

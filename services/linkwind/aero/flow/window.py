@@ -117,11 +117,12 @@ class Window:
             self.offset[:] = self._kept_offset
             self._kept, self._kept_offset = ahead, offset
 
-    def save(self) -> bytes:
-        """Return everything that changes, as an opaque blob."""
-        return self._head.pack(_MAGIC, *self.size, *self.offset.tolist(), self.step) + self.lattice.state
+    def save(self, before: bytes) -> bytes:
+        """Return everything that changes, as an opaque blob behind other bytes; it is copied once."""
+        head = self._head.pack(_MAGIC, *self.size, *self.offset.tolist(), self.step)
+        return b"".join((before, head, *self.lattice.parts))
 
-    def restore(self, blob: bytes) -> None:
+    def restore(self, blob: bytes | memoryview) -> None:
         """Take back what ``save`` returned.
 
         Raises:
