@@ -26,8 +26,12 @@ class Large(FakeModel):
     def commit(self, t: float, motion: Motion) -> None:
         self.count += 1
 
+    @staticmethod
+    def memory(count: int) -> bytes:
+        return count.to_bytes(8, "little") + bytes(SIZE - 8)
+
     def save(self) -> bytes:
-        return self.count.to_bytes(8, "little") + bytes(SIZE - 8)
+        return self.memory(self.count)
 
     def restore(self, blob: bytes) -> None:
         assert len(blob) == SIZE
@@ -79,9 +83,8 @@ def in_process(course: Course, first: int) -> list[tuple[int, Checkpoint]]:
 @pytest.mark.parametrize("march", [in_process, over_zenoh])
 def test_there_and_back(march) -> None:  # type: ignore[no-untyped-def]
     came = march(Course(checkpoint_every=5), 0)
-    expected = [State.of(count.to_bytes(8, "little") + bytes(SIZE - 8)) for count in (6, 11)]
     assert came == [
-        (6, Checkpoint(1, 5, 5 * STEP_NS, expected[0])),
-        (11, Checkpoint(2, 10, 10 * STEP_NS, expected[1])),
+        (6, Checkpoint(1, 5, 5 * STEP_NS, State.of(Large.memory(6)))),
+        (11, Checkpoint(2, 10, 10 * STEP_NS, State.of(Large.memory(11)))),
     ]
     assert march(Course(5, start=5, states={"aero": came[0][1]}, piece=SIZE // 3), 6) == came

@@ -6,11 +6,12 @@ import shutil
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 import pytest
 
+from linkwind import checkpoints
 from linkwind.aero.service import serve
 from linkwind.bus.zenoh import (
     ZenohDynamicsLink,
@@ -19,12 +20,14 @@ from linkwind.bus.zenoh import (
     ZenohRouter,
     loopback_endpoint,
 )
+from linkwind.checkpoints import Checkpoint, State
 from linkwind.credentials import Identity
 from linkwind.credentials.authority import DEFAULT_ROLES, Role, issue
 from linkwind.credentials.checks import load_identity
 from linkwind.errors import InputError, LostError, RefusedError, TrustError
-from linkwind.protocol import DynamicsSession, ProviderSession
-from tests.bus.test_zenoh import march, session
+from linkwind.protocol import Course, DynamicsSession, ProviderSession
+from tests.bus.test_checkpoints import Large, steps
+from tests.bus.test_zenoh import STEP_NS, march, session
 from tests.fakes import FakeModel
 
 Start = Callable[..., tuple[DynamicsSession, ZenohDynamicsLink]]
@@ -47,20 +50,22 @@ def endpoint() -> str:
 class Provider(threading.Thread):
     """A provider that serves in a thread and remembers how it ended."""
 
-    def __init__(self, endpoint: str, folder: Path | None, name: str = "aero") -> None:
+    def __init__(
+        self, endpoint: str, folder: Path | None, name: str = "aero", model: FakeModel | None = None
+    ) -> None:
         super().__init__(daemon=True)
         self.error: BaseException | None = None
         self.took = 0.0
-        self._arguments = endpoint, folder, name
+        self._arguments = endpoint, folder, name, model or FakeModel()
         self.start()
 
     def run(self) -> None:
-        endpoint, folder, name = self._arguments
+        endpoint, folder, name, model = self._arguments
         identity = load_identity(folder, name) if folder else None
         start = time.monotonic()
         with closing(ZenohProviderLink([endpoint], [], name=name, identity=identity)) as link:
             try:
-                serve(link, ProviderSession(name, lambda scenario, provider: FakeModel()), PATIENCE)
+                serve(link, ProviderSession(name, lambda scenario, provider: model), PATIENCE)
             except BaseException as error:
                 self.error = error
         self.took = time.monotonic() - start
@@ -101,6 +106,26 @@ def test_same_bits_as_without_tls_directly_and_through_a_router(
     d, link = dynamics(connect=other)
     with closing(ZenohRouter([other], [], ["aero"], load_identity(certs, "router"))):
         assert complete(d, link, provider) == without
+
+
+@pytest.mark.parametrize("routed", [False, True], ids=["directly", "through a router"])
+def test_checkpoints_go_there_and_back_in_pieces(
+    routed: bool, certs: Path, endpoint: str, dynamics: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(checkpoints, "PIECE", 100_000)
+    with ExitStack() as stack:
+        if routed:
+            identity = load_identity(certs, "router")
+            stack.enter_context(closing(ZenohRouter([endpoint], [], ["aero"], identity)))
+        begin = Checkpoint(1, 5, 5 * STEP_NS, State.of(Large.memory(6)))
+        d, link = dynamics(connect=endpoint if routed else "")
+        d.course = Course(5, start=5, states={"aero": begin}, piece=70_000)
+        provider = Provider(endpoint, certs, model=Large())
+        assert link.wait(lambda: not d.not_ready, PATIENCE, lambda: None)
+        last = Checkpoint(2, 10, 10 * STEP_NS, State.of(Large.memory(11)))
+        assert steps(d, link, 6) == [(6, begin), (11, last)]
+        provider.join(PATIENCE)
+    assert provider.error is None
 
 
 REFUSED = {  # folder of the certificates, role, error and what it says

@@ -127,7 +127,12 @@ def test_a_piece_that_is_lost_in_the_middle_of_a_log(tmp_path: Path, monkeypatch
     """What is behind it does not count."""
     monkeypatch.setattr(checkpoints, "PIECE", 3)
     whole = fly("two_link_field", tmp_path / "whole")
-    log = rewrite(whole.log, tmp_path / "hole.mcap", lambda t, n, p: None if (t, n) == PIECE_9 else p)
+    log = rewrite(
+        whole.log,
+        tmp_path / "hole.mcap",
+        lambda topic, number, payload: None if (topic, number) == PIECE_9 else payload,
+        {contents.END: {"complete": "false"}},
+    )
     assert checkpoint_steps(open_log(log), 1_000_000) == [10, 30, 40, 50, 60]
     done = go_on(log, tmp_path / "again")
     assert (done.plan.last, done.plan.start) == (20, 10)

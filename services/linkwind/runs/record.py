@@ -10,20 +10,22 @@ from typing import Any, NamedTuple
 from linkwind import checkpoints
 from linkwind.checkpoints import Checkpoint, Joining, Sequence
 from linkwind.errors import LogError, ProtocolError
+from linkwind.log.chunks import Message
 from linkwind.log.contents import CHECKPOINT, FRAMES, MOTION, TIMING, WRENCH
 from linkwind.log.reader import Log
 
 
 class Shown(NamedTuple):
-    """A message that is no part of the lock step: topic, simulation time [ns], payload as logged.
+    """A message that is no part of the lock step: topic, simulation time [ns].
 
-    ``sent`` makes it as it was on the bus.
+    ``logged`` returns its payload, and ``sent`` that as it was on the bus. A piece of a checkpoint is only
+    read then: call it once for each, in order.
     """
 
     topic: str
     time_ns: int
-    payload: bytes
-    sent: Callable[[], bytes]
+    logged: Callable[[], bytes]
+    sent: Callable[[bytes], bytes]
 
 
 class Exchange(NamedTuple):
@@ -54,6 +56,7 @@ def exchanges(log: Log, step_ns: int) -> Iterator[Exchange]:
     kinds = (WRENCH, *FRAMES, CHECKPOINT)
     topics = (MOTION, TIMING, *(kind + name for kind in kinds for name in providers))
     numbers: dict[int, int] = {}
+    pieces = {CHECKPOINT + name: log.of_topic(CHECKPOINT + name) for name in providers}
     current: Exchange | None = None
     for channel, number, time_ns, payload in log.messages(*topics):
         numbers[channel] = numbers.get(channel, 0) + 1
@@ -74,8 +77,12 @@ def exchanges(log: Log, step_ns: int) -> Iterator[Exchange]:
         elif topic.startswith(WRENCH):
             current.wrenches[topic.removeprefix(WRENCH)] = payload
         else:
-            sent = partial(log.as_sent, channel, number, payload)
-            current.shown.append(Shown(topic, time_ns, payload, sent))
+            logged = partial(_next, pieces[topic]) if topic in pieces else partial(bytes, payload)
+            current.shown.append(Shown(topic, time_ns, logged, partial(log.as_sent, channel, number)))
+
+
+def _next(messages: Iterator[Message]) -> bytes:
+    return next(messages)[3]
 
 
 class Record:

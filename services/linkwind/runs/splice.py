@@ -149,10 +149,11 @@ class ContinuedLog:
         if exchange is None:
             self._log.timing(payload, time_ns)
             return
-        for topic, shown_ns, recorded, sent in exchange.shown:
-            self._writer.copy(topic, recorded, shown_ns)
+        for topic, shown_ns, logged, sent in exchange.shown:
+            payload = logged()
+            self._writer.copy(topic, payload, shown_ns)
             if isinstance(self._log, PublishedLog):
-                self._log.publish(topic, sent(), shown_ns)
+                self._log.publish(topic, sent(payload), shown_ns)
 
     def frame(self, provider: str, frame: Frame) -> None:
         """Write a frame, unless it is in the record."""

@@ -176,6 +176,7 @@ class ZenohDynamicsLink(Endpoint):
             sample = self._receive(SPIN)
             if self._take_pieces():
                 since = time.monotonic()
+                self._look.set()  # more are on their way: do not sleep for a tick
             self._waited = time.monotonic() - since
             if sample is not None:
                 return _named(sample)
