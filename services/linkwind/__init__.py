@@ -11,7 +11,7 @@ From Python, what ``linkwind run`` does, with the results as arrays::
 ``load`` and ``loads`` make a scenario (:mod:`linkwind.scenario`). ``run``, ``verify``, ``resume`` and
 ``serve`` do what the commands do (:mod:`linkwind.api`), also with force models of your own: functions, or
 classes derived from ``ForceModel`` (:mod:`linkwind.aero.base`), which find the wind of the scenario with
-``Wind`` (:mod:`linkwind.wind`). ``open_log`` and ``table`` read a log
+``Wind`` (:mod:`linkwind.wind`). ``open_log``, ``table`` and ``means`` read a log
 (:mod:`linkwind.log.reader`), ``export_fmu`` writes an FMU (:mod:`linkwind.fmi.export`). All errors are
 ``LinkwindError`` (:mod:`linkwind.errors`).
 """
@@ -30,6 +30,7 @@ _PUBLIC = {
     "export_fmu": "linkwind.fmi.export:export",
     "load": "linkwind.scenario:load",
     "loads": "linkwind.scenario:loads",
+    "means": "linkwind.api:means",
     "open_log": "linkwind.log.reader:open_log",
     "resume": "linkwind.api:resume",
     "run": "linkwind.api:run",

@@ -1,7 +1,7 @@
 """The types of what ``import linkwind`` offers, for editors and checkers; ``__init__.py`` loads it lazily."""
 
 from linkwind.aero.base import Capabilities, ForceModel
-from linkwind.api import resume, run, serve, table, verify
+from linkwind.api import means, resume, run, serve, table, verify
 from linkwind.errors import LinkwindError
 from linkwind.fmi.export import export as export_fmu
 from linkwind.log.reader import open_log
@@ -16,6 +16,7 @@ __all__ = [
     "export_fmu",
     "load",
     "loads",
+    "means",
     "open_log",
     "resume",
     "run",

@@ -27,6 +27,7 @@ from linkwind import aero
 from linkwind.aero import Own, PythonSource
 from linkwind.aero.source import refuse_while_loading
 from linkwind.log import export
+from linkwind.log.means import means as _means
 from linkwind.log.reader import Log, open_log
 from linkwind.runs import resume as resuming
 from linkwind.runs import run as running
@@ -185,6 +186,27 @@ def table(log: Log | str | Path, name: str = "trajectory") -> dict[str, NDArray[
     """
     opened = _opened(log)
     return export.table(opened, name, labels_of(opened))
+
+
+def means(log: Log | str | Path, begin: float, end: float, name: str = "trajectory") -> dict[str, float]:
+    """Return the mean of each column of a table over a range of time, as ``linkwind log means``.
+
+    Args:
+        log: of a run: open, its file, or the run's folder.
+        begin: of the range [s].
+        end: of the range [s]; a whole number of beats later, say.
+        name: of the table, see :func:`table`.
+
+    Returns:
+        means by title, by the trapezoidal rule; at the ends of the range by straight lines between rows. NaN
+        where a value within the range is.
+
+    Raises:
+        InputError: the range reaches beyond the log, or is none.
+        LogError: there is no such log or table.
+    """
+    opened = _opened(log)
+    return _means(table(opened, name), begin, end, str(opened.path))
 
 
 def _own(models: Models) -> dict[str, Own]:

@@ -230,3 +230,11 @@ def flapper(steps=800) -> Run:
         force_power=np.zeros((k, 0)),
     )
     return run_of(description, path, np.full((k, 4), np.nan))
+
+
+def repeated(run, times):
+    """A longer run, made of the same one over and over."""
+    path = run.trajectory
+    long = Trajectory(*(np.concatenate([part] * times) for part in path))
+    long = long._replace(t=np.arange(len(long.t)) * 1e-3)
+    return run_of(run.scenario, long, np.ones((len(long.t), 4)))

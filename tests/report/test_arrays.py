@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from linkwind.report.arrays import every_nth, pack, peaks
+from linkwind.report.arrays import every_nth, means, pack, peaks
 
 
 @given(st.integers(0, 400), st.integers(2, 60))
@@ -61,3 +61,20 @@ def test_packed_numbers_are_little_endian(dtype):
 def test_a_number_too_large_for_the_page_becomes_infinite():
     read = np.frombuffer(base64.b64decode(pack(np.array([1e300]))["bdata"]), "<f4")
     assert read[0] == np.inf
+
+
+def test_means_between_the_points_of_a_thinned_curve_are_those_of_all_samples():
+    t = np.cumsum(np.random.default_rng(7).uniform(0.5, 1.5, 5000))
+    y = np.where(np.arange(5000) % 41 == 0, 30.0, np.sin(t))  # spikes, which thinning prefers
+    keep = peaks(y, 200)
+    found = means(t, y, keep)
+    whole = np.sum(0.5 * np.diff(t) * (y[1:] + y[:-1])) / (t[-1] - t[0])
+    assert found @ np.diff(t[keep]) / (t[-1] - t[0]) == pytest.approx(whole, rel=1e-12)
+    assert np.sum(np.diff(t[keep]) * (y[keep][1:] + y[keep][:-1]) / 2) / (t[-1] - t[0]) > 3 * whole
+
+
+def test_a_sample_that_is_missing_spoils_the_mean_around_it_only():
+    y = np.ones(9)
+    y[5] = np.nan
+    found = means(np.arange(9.0), y, np.arange(0, 9, 2))
+    assert np.flatnonzero(np.isnan(found)).tolist() == [2]

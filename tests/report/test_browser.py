@@ -10,7 +10,7 @@ from linkwind.report.flow import survey
 from linkwind.report.page import render
 
 from .chromium import PROGRAM, Chromium
-from .synthetic import flapper, planar
+from .synthetic import flapper, planar, repeated
 from .wakes import wake
 
 pytestmark = pytest.mark.skipif(
@@ -42,6 +42,12 @@ def pages(tmp_path_factory):
     runs["wide"] = dataclasses.replace(
         planar(400, name="wide"), trajectory=runs["planar"].trajectory._replace(**small)
     )
+    spike = runs["planar"].trajectory.linear.copy()
+    spike[:3] = 1000.0
+    runs["spike"] = dataclasses.replace(
+        planar(400, name="spike"), trajectory=runs["planar"].trajectory._replace(linear=spike)
+    )
+    runs["thinned"] = thinned()
     flow = survey("aero", lambda: wake(planar(400), every=50, rows=56, columns=64))
     runs["flow"] = dataclasses.replace(planar(400, name="flow"), flows=(flow,))
     for name, run in runs.items():
@@ -56,6 +62,14 @@ def browser(tmp_path_factory):
     chromium.send("Emulation.setDeviceMetricsOverride", **size)
     yield chromium
     chromium.close()
+
+
+def thinned():
+    """Return a run of more states than a curve has points on the page, with a spike at every 9th."""
+    run = repeated(planar(400, name="thinned"), 40)
+    linear = run.trajectory.linear.copy()
+    linear[::9] += 50.0
+    return dataclasses.replace(run, trajectory=run.trajectory._replace(linear=linear))
 
 
 @pytest.fixture
@@ -187,6 +201,89 @@ def test_a_zoom_is_shared_by_all_plots(page):
         assert (low, high) == pytest.approx((0.1, 0.3), abs=0.01)
     page.click(left + width / 2, y, times=2)
     page.until(f"{ranges}.every(r => r[0] === 0 && r[1] === 0.4)")
+
+
+MEANS = (
+    "[...document.querySelectorAll('.readout i')].map(i => Number(i.textContent.slice(5).replace('−', '-')))"
+)
+
+
+def look_closer(browser, low, high):
+    """Type a range of time for the plots."""
+    browser.evaluate(
+        f"""(([from, to]) => {{
+          [from.value, to.value] = [{low}, {high}];
+          to.dispatchEvent(new Event("change", {{ bubbles: true }}));
+        }})(document.querySelectorAll('.range input'))"""
+    )
+
+
+def mean(t, y, low, high):
+    fine = np.linspace(low, high, 100_001)
+    return np.interp(fine, t, y).mean()
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.1, 0.3), (0.0503, 0.3498)])
+def test_means_are_those_over_the_range_that_is_typed(page, low, high):
+    path = planar(400).trajectory
+    before = page.evaluate(MEANS)
+    assert before[:2] == pytest.approx([mean(path.t, path.linear[:, b, 0], 0, 0.4) for b in (0, 1)], abs=1e-3)
+    look_closer(page, low, high)
+    assert page.evaluate("document.querySelector('.plot').layout.xaxis.range") == [low, high]
+    expected = [mean(path.t, path.linear[:, b, axis], low, high) for axis in (0, 1) for b in (0, 1)]
+    assert page.evaluate(MEANS)[:4] == pytest.approx(expected, abs=1e-3)
+    page.evaluate("document.querySelector('.range button').click()")
+    assert page.evaluate(MEANS) == before
+
+
+def test_a_drag_fills_the_fields_of_the_range(page):
+    zoom = "{'xaxis.range[0]': 0.15, 'xaxis.range[1]': 0.25}"  # as a drag over the plot ends
+    page.evaluate(f"document.querySelector('.plot').emit('plotly_relayout', {zoom})")
+    fields = "[...document.querySelectorAll('.range input')].map(field => Number(field.value))"
+    assert page.evaluate(fields) == [0.15, 0.25]
+    look_closer(page, 0.3, 0.2)  # none: what was there stays
+    assert page.evaluate(fields) == [0.15, 0.25]
+    page.evaluate("document.querySelector('.range button').click()")
+    assert page.evaluate(fields) == [0.0, 0.4]
+
+
+def test_keys_typed_into_the_range_do_not_move_the_time(page):
+    scrub(page, 123)
+    page.evaluate("document.querySelector('.range input').focus()")
+    for key in ("End", "ArrowLeft", " "):
+        page.key(key)
+        assert page.evaluate(T) == 0.123, key
+    assert page.evaluate(LABEL) == "Play"
+
+
+def test_a_closer_look_has_the_heights_of_its_own_part(browser, pages):
+    """A spike at the start makes the rest flat: beyond it that has the plot for itself."""
+    browser.open(pages / "spike.html")
+    heights = "document.querySelector('.plot').layout.yaxis.range"
+    path = planar(400).trajectory
+    look_closer(browser, 0.1, 0.3)
+    part = path.linear[100:301, :, 0]
+    low, high = browser.evaluate(heights)
+    assert low < part.min() < part.max() < high
+    assert high - low < 1.2 * np.ptp(part)
+    browser.evaluate("document.querySelector('.range button').click()")
+    assert browser.evaluate(heights)[1] > 900.0
+
+
+def test_means_of_a_thinned_curve_are_those_of_all_its_samples(browser, pages):
+    """Every 9th sample is a spike: points that keep the largest of each interval are mostly spikes."""
+    browser.open(pages / "thinned.html")
+    assert browser.evaluate("document.querySelector('.plot').data[0].x.length") < 2100
+    path = thinned().trajectory
+    at = browser.evaluate("[300, 1500].map(i => document.querySelector('.plot').data[0].x[i])")
+    look_closer(browser, *at)
+    rows = slice(*np.searchsorted(path.t, at), None)
+    y = np.append(path.linear[rows, 0, 0], path.linear[rows.stop, 0, 0])
+    shown = browser.evaluate(MEANS)[0]
+    assert shown == pytest.approx(np.convolve(y, [0.5, 0.5], "valid").mean(), abs=0.006)
+    assert browser.evaluate("document.querySelector('.range').textContent").endswith(
+        "its mean over that time"
+    )
 
 
 def test_the_camera_follows_on_demand(page):

@@ -11,7 +11,6 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from linkwind.log.tables import Trajectory
 from linkwind.report import page as page_module
 from linkwind.report.arrays import every_nth
 from linkwind.report.data import no_trajectory
@@ -19,7 +18,7 @@ from linkwind.report.page import render, script_json
 from linkwind.report.panels import POINTS, prefixed
 from linkwind.report.scene import FRAMES
 
-from .synthetic import flapper, planar, run_of, scenario
+from .synthetic import flapper, planar, repeated, run_of, scenario
 
 HOSTILE = "</script><img src=x onerror=alert(1)>&\u2028"
 
@@ -62,14 +61,6 @@ def unpack(packed, *shape):
 
 def rows_of(data):
     return {row["label"]: row for panel in data["panels"] for row in panel["rows"]}
-
-
-def repeated(run, times):
-    """A longer run, made of the same one over and over."""
-    path = run.trajectory
-    long = Trajectory(*(np.concatenate([part] * times) for part in path))
-    long = long._replace(t=np.arange(len(long.t)) * 1e-3)
-    return run_of(run.scenario, long, np.ones((len(long.t), 4)))
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -315,6 +306,8 @@ def test_a_long_run_is_thinned_but_keeps_its_peaks(run):
             assert (y.min(), y.max()) == (all_of_it.min(), all_of_it.max())
             assert (x[0], x[-1]) == (long.trajectory.t[0], long.trajectory.t[-1])
             assert np.array_equal(y, all_of_it[np.round(x * 1e3).astype(int)])
+            mean = np.dot(unpack(curve["means"]), np.diff(x)) / x[-1]
+            assert mean == pytest.approx(np.convolve(force[:, b, axis], [0.5, 0.5], "valid").mean(), rel=1e-5)
     assert f"The run has {len(long.trajectory.t)} states" in page.texts["body"]
     assert f"a curve at most {POINTS} points" in page.texts["body"]
     assert not unpack(page.data["t"]).size  # no curve needs them

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from linkwind.errors import FaultError, LogError
@@ -163,11 +164,36 @@ def test_of_a_long_log_a_sample_is_shown_and_all_where_somebody_looks(browser, l
             browser.until(f"{T} === {k / 1000}")
         zoom = "{'xaxis.range[0]': 0.15, 'xaxis.range[1]': 0.17}"  # as a drag over the plot ends
         browser.evaluate(f"document.querySelector('.plot').emit('plotly_relayout', {zoom})")
-        browser.until(f"{points}[0] === 0.15 && {points}.length === 21")
+        browser.until(f"{points}[0] === 0.149 && {points}.length === 23")
         shown = browser.evaluate("Array.from(document.querySelector('.plot').data[0].y)")
-        assert shown == pytest.approx(path.linear[150:171, 0, 0].tolist(), rel=1e-5)
+        assert shown == pytest.approx(path.linear[149:172, 0, 0].tolist(), rel=1e-5)
         browser.evaluate("document.querySelector('.plot').dispatchEvent(new MouseEvent('dblclick'))")
         browser.until(f"{points}.length < 25 && {points}.at(-1) === 0.3")
+        assert troubles(browser) == []
+
+
+def test_means_are_of_all_states_where_they_are_here_else_so_marked(browser, logs, monkeypatch):
+    monkeypatch.setattr(recordings, "WHOLE", (50, 1e9))
+    monkeypatch.setattr(recordings, "SAMPLES", 21)
+    mean, told = (
+        "document.querySelector('.readout i').textContent",
+        "document.querySelector('.range').textContent",
+    )
+    path = open_log(logs["planar"]).trajectory()
+    with served(logs["planar"]) as url:
+        show(browser, url)
+        browser.until(f"{mean}.startsWith('mean ≈') && {told}.endsWith('≈ as one state in 15 is here')")
+        browser.evaluate(
+            """(([from, to]) => {
+              [from.value, to.value] = ["0.1503", "0.1707"];
+              to.dispatchEvent(new Event("change", { bubbles: true }));
+            })(document.querySelectorAll('.range input'))"""
+        )
+        browser.until(f"!{mean}.includes('≈') && {told}.endsWith('its mean over that time')")
+        fine = np.linspace(0.1503, 0.1707, 100_001)
+        expected = np.interp(fine, path.t, path.linear[:, 0, 0]).mean()
+        shown = browser.evaluate(mean).replace("mean ", "").replace("−", "-")
+        assert float(shown) == pytest.approx(expected, abs=0.0006)
         assert troubles(browser) == []
 
 

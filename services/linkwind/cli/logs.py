@@ -1,8 +1,9 @@
-"""``linkwind log …``: what is in a log, a clean file from a damaged one, tables for other tools."""
+"""``linkwind log …``: what is in a log, a clean file from a damaged one, tables for other tools, means."""
 
 from __future__ import annotations
 
 import json
+import math
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -16,6 +17,8 @@ HELP = """Look into a log, recover or export it.
 Example: linkwind log info runs/two_link-20260101-120000
 
 Example: linkwind log export runs/two_link-20260101-120000 -o tables
+
+Example: linkwind log means runs/two_link-20260101-120000 --from 0.5 --to 1
 """
 
 
@@ -33,6 +36,7 @@ def register(app: typer.Typer) -> None:
     group.command()(info)
     group.command()(recover)
     group.command()(export)
+    group.command()(means)
     app.add_typer(group, name="log")
 
 
@@ -112,3 +116,28 @@ def export(
         paths = (export_csv if format_ == Format.CSV else export_parquet)(opened, out, labels_of(opened))
     for path in paths:
         typer.echo(f"wrote {path}")
+
+
+def means(
+    log: LogArgument,
+    begin: Annotated[float, typer.Option("--from", help="Begin of the range of time [s].")],
+    end: Annotated[float, typer.Option("--to", help="End of the range of time [s].")],
+    name: Annotated[
+        str, typer.Option("--table", help="trajectory, steps or wrench_PROVIDER.")
+    ] = "trajectory",
+    as_json: JsonOption = False,
+) -> None:
+    """Print the mean of each column of a table over a range of time, such as a beat; nan where a value is.
+
+    Example: linkwind log means runs/two_link-20260101-120000 --from 0.5 --to 1
+    """
+    from linkwind import api
+
+    found = api.means(log, begin, end, name)
+    if as_json:
+        typer.echo(
+            json.dumps({title: mean if math.isfinite(mean) else None for title, mean in found.items()})
+        )
+        return
+    for title, mean in found.items():
+        typer.echo(f"{mean:>13.6g}  {title}")

@@ -45,3 +45,19 @@ def peaks(y: Array, limit: int) -> NDArray[np.intp]:
     lowest = start + np.where(missing, np.inf, padded).argmin(axis=1)
     highest = start + np.where(missing, -np.inf, padded).argmax(axis=1)
     return np.unique(np.concatenate([[0], lowest, highest, [count - 1]]))
+
+
+def means(t: Array, y: Array, keep: NDArray[np.intp]) -> Array:
+    """Return the mean of a curve from each of some of its samples to the next, by the trapezoidal rule.
+
+    Args:
+        t: times, ascending, shape (n,).
+        y: samples, shape (n,).
+        keep: ascending indices of m samples, the first and the last among them.
+
+    Returns:
+        means, shape (m - 1,); NaN where samples are, or no time passes.
+    """
+    with np.errstate(all="ignore"):  # of a run that diverged
+        areas = 0.5 * np.diff(t) * (y[1:] + y[:-1])
+        return np.asarray(np.add.reduceat(areas, keep[:-1]) / np.diff(t[keep]))

@@ -21,7 +21,7 @@ from linkwind.report.scene import scene
 from linkwind.report.tables import tables
 
 _ASSETS = files("linkwind.report").joinpath("assets")
-_SCRIPTS = ("clock.js", "charts.js", "motion.js", "film.js", "reel.js", "wake.js", "vortices.js",
+_SCRIPTS = ("clock.js", "range.js", "charts.js", "motion.js", "film.js", "reel.js", "wake.js", "vortices.js",
             "scene.js", "main.js")  # fmt: skip
 
 

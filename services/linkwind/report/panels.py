@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from linkwind.report.arrays import pack, peaks
+from linkwind.report.arrays import means, pack, peaks
 from linkwind.report.data import Diagnostics, Run, largest
 from linkwind.spatial import Array
 
@@ -56,13 +56,22 @@ def _row(label: str, *curves: dict[str, Any], **how: bool | str) -> dict[str, An
 
 
 def _curve(run: Run, name: str, colour: int, y: Array, t: Array | None = None) -> dict[str, Any]:
-    """Return one curve; ``x`` is left out where it is the trajectory's own times, not thinned."""
-    keep = np.arange(y.size) if y.size <= shown_whole(run) else peaks(y, points_per_curve(run))
+    """Return one curve.
+
+    ``x`` is left out where it is the trajectory's own times, not thinned. With a thinned one come ``means``,
+    of all its samples from each of its points to the next.
+    """
     times = run.trajectory.t if t is None else t
-    shared = keep.size == y.size and np.array_equal(times, run.trajectory.t)
-    return {"name": name, "colour": colour, "y": pack(y[keep])} | (
-        {} if shared else {"x": pack(times[keep], "f8")}
-    )
+    curve = {"name": name, "colour": colour}
+    if y.size > shown_whole(run):
+        keep = peaks(y, points_per_curve(run))
+        return curve | {
+            "y": pack(y[keep]),
+            "x": pack(times[keep], "f8"),
+            "means": pack(means(times, y, keep)),
+        }
+    shared = np.array_equal(times, run.trajectory.t)
+    return curve | {"y": pack(y)} | ({} if shared else {"x": pack(times, "f8")})
 
 
 def _body_rows(run: Run, labels: Sequence[str], columns: Array) -> list[dict[str, Any]]:

@@ -1,6 +1,7 @@
 // The plots: one plotly figure a row, one time range and one cursor for all of them.
 
 import { indexAt, unpack } from "./clock.js";
+import { makeRange, meanOf, reachOf } from "./range.js";
 
 const MARGIN = { l: 62, r: 10, t: 6, b: 8 }; // on the left at least: all plots share the widest that one needs
 const BOTTOM = 36; // of a row that carries the time axis
@@ -24,13 +25,13 @@ export function makeKey(bodies) {
 
 const DASHES = ["solid", "dash", "dot", "dashdot"];
 
-// Numbers of one row all have the same number of decimals, so that they do not jump.
-function formatter(row) {
+// Numbers of one row all have the same number of decimals, so that they do not jump; means have `more`.
+function formatter(row, more = 0) {
   let largest = 0;
   for (const curve of row.curves) for (const y of curve.y) if (Math.abs(y) > largest && isFinite(y)) largest = Math.abs(y);
-  if (row.log || largest >= 1e5 || (largest > 0 && largest < 1e-2)) return (y) => y.toExponential(1).replace("-", "−");
+  if (row.log || largest >= 1e5 || (largest > 0 && largest < 1e-2)) return (y) => y.toExponential(1 + more).replace("-", "−");
   const decimals = row.whole ? 0 : Math.min(4, Math.max(largest < 1000 ? 1 : 0, 2 - Math.floor(Math.log10(largest || 1))));
-  return (y) => y.toFixed(decimals).replace("-", "−");
+  return (y) => y.toFixed(decimals + more).replace("-", "−");
 }
 
 // Ticks of a logarithmic axis at 1, 2 and 5 times the powers of ten; at these alone where those would not fit.
@@ -47,7 +48,7 @@ function layoutOf(row, range, left, colour) {
     gridcolor: colour("grid"), zerolinecolor: colour("line"), linecolor: colour("line"), ticks: "outside",
     tickcolor: colour("line"), ticklen: 4, exponentformat: "power", automargin: false,
   };
-  const bottom = row.last ? BOTTOM : MARGIN.b;
+  const bottom = row.last ? BOTTOM : MARGIN.b, reach = row.bars ? null : reachOf(row.curves, range, row.log);
   return {
     margin: { ...MARGIN, l: left, b: bottom }, showlegend: false, hovermode: false, bargap: 0.04,
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
@@ -60,7 +61,7 @@ function layoutOf(row, range, left, colour) {
     yaxis: {
       ...axis, automargin: "left", title: { text: row.label, standoff: 4 }, type: row.log ? "log" : "linear", nticks: 5, zeroline: !row.log,
       rangemode: row.bars ? "tozero" : "normal", tickformat: row.whole ? "d" : undefined,
-      dtick: row.log ? undefined : row.whole ? 1 : undefined,
+      dtick: row.log ? undefined : row.whole ? 1 : undefined, ...(reach ? { range: reach, autorange: false } : { autorange: true }),
     },
   };
 }
@@ -95,10 +96,18 @@ function makeRow(row, card) {
     item.append(curve.name, " ", document.createElement("b"));
     return item.lastChild;
   });
+  const means = row.bars || row.log || row.whole ? [] : values.map((value) => {
+    value.after(document.createElement("i"));
+    return value.nextSibling;
+  });
   const made = { ...row, plot, cursor, format: formatter(row) };
   made.show = (t) => made.curves.forEach((curve, i) => {
     const y = curve.y[indexAt(curve.x, t + 1e-12 * Math.abs(t))];
     values[i].textContent = Number.isFinite(y) ? made.format(y) : "–";
+  });
+  made.average = (range, sampled) => means.forEach((text, i) => {
+    const mean = meanOf(made.curves[i], range), format = formatter(made, 1);
+    text.textContent = `mean ${sampled ? "≈ " : ""}${Number.isFinite(mean) ? format(mean) : "–"}`;
   });
   return made;
 }
@@ -115,6 +124,7 @@ function unpacked(panels, series) {
         y: unpack(curve.y),
         x: curve.x ? unpack(curve.x) : series,
         ...(curve.width ? { width: unpack(curve.width) } : {}),
+        ...(curve.means ? { means: unpack(curve.means) } : {}),
       })),
     })),
   }));
@@ -130,7 +140,8 @@ export function makeCharts(panels, clock, host, zoomed = () => {}) {
   const config = {
     displaylogo: false, responsive: true, staticPlot: coarse, displayModeBar: false, doubleClick: false,
   };
-  let rows = [], timed = [], notes = [], kind = null, range = whole(), left = MARGIN.l;
+  const limits = makeRange((typed) => zoom(typed ?? whole()));
+  let rows = [], timed = [], notes = [], kind = null, range = whole(), left = MARGIN.l, spacing = 1;
 
   function whole() {
     const pad = clock.last > clock.first ? 0 : 0.5;
@@ -148,12 +159,23 @@ export function makeCharts(panels, clock, host, zoomed = () => {}) {
     }
   }
 
+  // Tells the range, and the means over it.
+  function average() {
+    const [low, high] = whole();
+    limits.show(range, low === range[0] && high === range[1], spacing);
+    for (const row of timed) row.average(range, spacing > 1);
+  }
+
   function zoom(to) {
     if (to[0] === range[0] && to[1] === range[1]) return;
     range = to;
-    for (const { plot } of timed) Plotly.relayout(plot, { "xaxis.range": [...range], "yaxis.autorange": true });
+    for (const { plot, curves, log } of timed) {
+      const reach = reachOf(curves, range, log);
+      Plotly.relayout(plot, { "xaxis.range": [...range], ...(reach ? { "yaxis.range": reach } : { "yaxis.autorange": true }) });
+    }
     align();
     place(clock.t);
+    average();
     const [low, high] = whole();
     zoomed(range, low === range[0] && high === range[1]);
   }
@@ -196,7 +218,7 @@ export function makeCharts(panels, clock, host, zoomed = () => {}) {
 
   function build(panels) {
     for (const { plot } of rows) Plotly.purge(plot);
-    host.replaceChildren();
+    host.replaceChildren(limits.bar);
     left = MARGIN.l;
     notes = [];
     rows = panels.flatMap((panel) => {
@@ -223,9 +245,11 @@ export function makeCharts(panels, clock, host, zoomed = () => {}) {
     }
   });
 
-  function show(panels, series, to = range) {
+  // `every`: how many steps there are from one sample to the next.
+  function show(panels, series, to = range, every = 1) {
     const all = unpacked(panels, series), now = kindOf(panels);
     range = to;
+    spacing = every;
     if (now !== kind) { kind = now; build(all); }
     else {
       all.flatMap((panel) => panel.rows).forEach((row, i) => {
@@ -235,6 +259,7 @@ export function makeCharts(panels, clock, host, zoomed = () => {}) {
     }
     place(clock.t);
     for (const row of timed) row.show(clock.t);
+    average();
     panels.forEach((panel, i) => { notes[i].textContent = panel.note; });
   }
 

@@ -87,7 +87,7 @@ export function makeControls(clock) {
   });
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    if (event.target.closest("select, summary, a, textarea, input[type=checkbox], .modebar")) return;
+    if (event.target.closest("select, summary, a, textarea, input:not([type=range]), .modebar")) return;
     const slider = event.target === scrub; // steps by itself on the arrow keys
     const act = {
       " ": event.target === play ? null : () => clock.toggle(),

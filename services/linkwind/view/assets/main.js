@@ -101,18 +101,19 @@ function show(window) {
   } else {
     view.poses.overview = window.scene;
   }
-  view.whole = { panels: window.panels, series };
-  if (view.zoom === null) view.charts.show(window.panels, series, [clock.first, horizon() > clock.first ? horizon() : clock.first + 1]);
+  view.whole = { panels: window.panels, series, every: window.every };
+  if (view.zoom === null) view.charts.show(window.panels, series, [clock.first, horizon() > clock.first ? horizon() : clock.first + 1], window.every);
   view.scene.draw();
 }
 
 // More of what the plots are zoomed to.
 async function zoomed([low, high], whole) {
   const range = (view.zoom = whole ? null : [low, high]);
-  if (whole) return view.charts.show(view.whole.panels, view.whole.series, [clock.first, horizon()]);
+  if (whole) return view.charts.show(view.whole.panels, view.whole.series, [clock.first, horizon()], view.whole.every);
   if (loaded.every === 1) return;
-  const window = await ask(`window?from=${Math.max(low, clock.first)}&to=${Math.min(high, clock.last)}`);
-  if (view.zoom === range && window.scene) view.charts.show(window.panels, unpack(window.t), range);
+  const { step } = clock; // a state more at both ends, for means right up to them
+  const window = await ask(`window?from=${Math.max(low - step, clock.first)}&to=${Math.min(high + step, clock.last)}`);
+  if (view.zoom === range && window.scene) view.charts.show(window.panels, unpack(window.t), range, window.every);
 }
 
 // Every state around the time that is looked at.

@@ -73,7 +73,7 @@ export function makePlaybar(clock, run, spacing) {
 
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    if (event.target.closest?.("select, input[type=checkbox]")) return;
+    if (event.target.closest?.("select, input:not([type=range])")) return;
     const button = event.target.closest?.("button");
     const act = {
       " ": button ? null : toggle,
