@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from linkwind import aero
+from linkwind.aero.flow.grid import MAX_SPEED
 from linkwind.aero.flow.outline import SPACING, inset, markers
 from linkwind.errors import ScenarioError, SimulationError
 from linkwind.runs.validate.driven import at_rest, motion
 from linkwind.scenario import load, loads
 from linkwind.spatial import Wrench
-from tests.aero.flows import STEP, driven, text
+from tests.aero.flows import CELLS, STEP, driven, text
 
 FAST = "expected bodies of at most 256 lattice steps"
 ELLIPSE = '{ type = "ellipse", length = 1.0, width = 0.05 }'
@@ -90,6 +91,45 @@ def test_a_body_that_becomes_too_fast():
     flow.model.evaluate(3 * STEP, fast, _wrench())
     with pytest.raises(SimulationError, match=FAST):
         flow.model.commit(3 * STEP, fast)
+
+
+RAIL = """
+[[joints]]
+name = "rail"
+type = "prismatic"
+parent = "world"
+child = "body"
+"""
+CARRIED = (
+    RAIL
+    + """
+[[forces]]
+type = "motion"
+name = "carriage"
+joint = "rail"
+position = "0.0"
+"""
+)
+
+
+@pytest.mark.parametrize(("joint", "substeps"), [(CARRIED, 2), (RAIL, None)])
+def test_a_light_body_becomes_too_fast_for_a_lattice_step_if_the_fluid_moves_it(joint, substeps):
+    """One that goes as stated cannot become unstable, whatever its mass: its step is taken in two."""
+    light = text(body="mass = 1e-3\ninertia = 1e-3").replace("[aero]\n", joint + "[aero]\n")
+    scenario = loads(light, "scene.toml")
+    model, wrench = aero.build(scenario, scenario.providers[0]), _wrench()
+    wrench.diagnostics = np.zeros(4)
+    fast = _motion(0.0)
+    fast.linear[0, 0] = 1.5 * MAX_SPEED / CELLS / STEP  # one and a half times what a lattice step allows
+    model.commit(0.0, _motion(0.0))
+    model.evaluate(STEP, fast, wrench)
+    if substeps is None:
+        with pytest.raises(SimulationError, match=r'coupling.step: .* "body" is light'):
+            model.commit(STEP, fast)
+    else:
+        model.commit(STEP, fast)
+        model.evaluate(2 * STEP, fast, wrench)
+        assert wrench.diagnostics[3] == substeps
 
 
 def _motion(x):

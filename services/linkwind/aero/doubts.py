@@ -79,7 +79,7 @@ def _too_light(scenario: Scenario, provider: Provider) -> Iterator[str]:
     if grid.substeps == 1:
         return
     wanted = next(ratio for count, ratio in WANTED if grid.substeps <= count)
-    for body in grids.bodies(scenario, provider):
+    for body in grids.moved_by_the_fluid(scenario, provider):
         fluid = grids.moved(body, grid)
         if body.mass < wanted * fluid:
             yield (

@@ -13,6 +13,7 @@ from linkwind.errors import ScenarioError
 from linkwind.native.fluid import shear_rate
 from linkwind.scenario import Provider, Scenario
 from linkwind.scenario.bodies import Body
+from linkwind.scenario.prescribed import prescribed
 from linkwind.scenario.shapes import AnyShape, Circle, Ellipse, Ellipsoid, Rectangle, Wing, signed_area
 from linkwind.spatial import Array
 
@@ -85,6 +86,12 @@ class Grid:
 def bodies(scenario: Scenario, provider: Provider) -> list[Body]:
     """Return the bodies in the flow."""
     return [scenario.bodies[i] for i in body_indices(scenario, provider)]
+
+
+def moved_by_the_fluid(scenario: Scenario, provider: Provider) -> list[Body]:
+    """Return the bodies in the flow whose motion is not stated for all times."""
+    stated = prescribed(scenario)
+    return [body for body in bodies(scenario, provider) if body.name not in stated]
 
 
 def plan(scenario: Scenario, provider: Provider) -> Grid:

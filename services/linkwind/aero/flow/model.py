@@ -304,7 +304,8 @@ class Flow:
             self._shorten(fastest)
 
     def _shorten(self, fastest: float) -> None:
-        light = [body.name for body in self._acted if body.mass < grids.moved(body, self._grid)]
+        moving = grids.moved_by_the_fluid(self._scenario, self._provider)
+        light = [body.name for body in moving if body.mass < grids.moved(body, self._grid)]
         if self._substeps == 1 and light:
             limit = grids.MAX_SPEED * self._window.speed
             raise self._refuse.too_fast_for_light(light[0], fastest, limit)
