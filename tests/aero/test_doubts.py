@@ -8,7 +8,7 @@ import math
 import pytest
 
 from linkwind import aero
-from linkwind.aero.doubts import doubts
+from linkwind.aero.doubts import doubts, doubts_after
 from linkwind.errors import LinkwindError
 from linkwind.report.data import read
 from linkwind.report.gallery import gallery
@@ -184,3 +184,21 @@ def test_a_wing_far_beyond_what_the_wake_model_knows(angle: float, told: bool, t
     caption = gallery(read(done.log))
     assert f"Largest angle of attack: {angle:.0f}°." in caption
     assert ("a real flow separates" in caption) == told
+
+
+@pytest.mark.parametrize(
+    ("changes", "advance", "told"),
+    [
+        ([], 2.5, 'coupling.step: the fastest point of a wing went 2.5 panels of "aero" in a step'),
+        ([], 0.2, "aero.vortex.wake: 60 rows reach 2.4 chords behind the fastest point"),  # 60 · 0.2 / 5
+        ([], 0.9, None),
+        ([], math.nan, None),
+        (["environment.wind=[-50,0,0]"], 8.0, None),  # was told before the run
+    ],
+)
+def test_a_wake_that_is_too_coarse_or_too_short_by_the_beat_of_the_wings(changes, advance, told):
+    """A wing that is at rest at the start, in still air, tells nothing of it before the run."""
+    scenario = load("flapper_wake", ["bodies.body.velocity=[0,0,0]", *changes])
+    found = list(doubts_after(scenario, {"aero": {"incidence_deg": 5.0, "advance": advance}}))
+    assert len(found) == (told is not None)
+    assert told is None or told in found[0]

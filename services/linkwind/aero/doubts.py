@@ -43,12 +43,40 @@ def doubts_after(scenario: Scenario, reported_max: Mapping[str, Mapping[str, flo
         reported_max: the largest of each of a provider's own numbers, by provider and name.
     """
     for provider in scenario.providers:
+        if provider.model == "vortex":
+            yield from _advanced(scenario, provider, reported_max.get(provider.name, {}).get("advance", 0.0))
         angle = reported_max.get(provider.name, {}).get("incidence_deg", 0.0)
         if provider.model == "vortex" and angle > BEYOND_DEG:
             yield (
                 f"{item(scenario, provider, 'model')}: the largest angle of attack was {angle:.0f}°; from "
                 f"some {SEPARATES_DEG:g}° on a real flow separates, which model vortex does not know."
             )
+
+
+def _advanced(scenario: Scenario, provider: Provider, advance: float) -> Iterator[str]:
+    """Yield what was wrong with a wake that nothing told of before the run: its wings were at rest.
+
+    Args:
+        scenario: of the run.
+        provider: whose wake it is.
+        advance: panels that the fastest point of a wing went in a step, at most.
+    """
+    settings, step = provider.vortex, scenario.coupling.step
+    chords = advance * settings.wake / settings.chordwise
+    if list(_of_rings(scenario, provider)):
+        return
+    if advance > COARSE:
+        yield (
+            f"{scenario.source}: coupling.step: the fastest point of a wing went {advance:.2g} panels of "
+            f'"{provider.name}" in a step, and as long are the rings of its wake; one is enough. Use about '
+            f"{step / advance:.2g} s."
+        )
+    elif 0.0 < chords < SHORT and settings.wake < scenario.steps:
+        yield (
+            f"{item(scenario, provider, 'vortex', 'wake')}: {settings.wake} rows reach {chords:.2g} chords "
+            f"behind the fastest point of a wing at most, and what a shorter wake than {SHORT:g} leaves out "
+            f"is felt. Use {math.ceil(SHORT / chords * settings.wake)} or more, or a larger coupling.step."
+        )
 
 
 def _no_wind(scenario: Scenario) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from linkwind.errors import LostError, ScenarioError
 from linkwind.listening import description
 from linkwind.log.writer import LogWriter
 from linkwind.mechanism import Mechanism, build
+from linkwind.mechanism.doubts import doubts
 from linkwind.native.library import library_sha256
 from linkwind.runs import folder as folders
 from linkwind.runs import room
@@ -29,6 +31,8 @@ from linkwind.runs.keeping import keep
 from linkwind.runs.successor import Successor
 from linkwind.runs.watch import Watch
 from linkwind.scenario import Scenario
+
+_log = logging.getLogger("linkwind")
 
 
 @dataclass(frozen=True)
@@ -155,6 +159,8 @@ def checked(scenario: Scenario) -> Mechanism:
     mechanism = build(scenario)
     methods.check(mechanism, scenario)
     aero.check(scenario)
+    for doubt in doubts(scenario):
+        _log.warning("note: %s", doubt)
     return mechanism
 
 
