@@ -47,6 +47,11 @@ def pages(tmp_path_factory):
     runs["spike"] = dataclasses.replace(
         planar(400, name="spike"), trajectory=runs["planar"].trajectory._replace(linear=spike)
     )
+    wrench = runs["planar"].trajectory.wrench.copy()
+    wrench[:2] *= 1000.0
+    runs["impulse"] = dataclasses.replace(
+        planar(400, name="impulse"), trajectory=runs["planar"].trajectory._replace(wrench=wrench)
+    )
     runs["thinned"] = thinned()
     flow = survey("aero", lambda: wake(planar(400), every=50, rows=56, columns=64))
     runs["flow"] = dataclasses.replace(planar(400, name="flow"), flows=(flow,))
@@ -328,6 +333,18 @@ def test_the_numbers_of_the_grid_are_told_apart_and_none_is_cut(browser, pages):
         numbers = [text for text in texts[: texts.index("m")] if text.startswith("1234")]  # of one picture
         assert len(numbers) > 3
         assert len(set(numbers)) == len(numbers)
+
+
+def test_a_spike_does_not_make_all_other_arrows_vanish(browser, pages):
+    """The arrow of the key is of about the same force with and without an impulse at the start."""
+    keys = []
+    for name in ("planar", "impulse"):
+        browser.open(pages / f"{name}.html")
+        browser.evaluate(WRITES)
+        scrub(browser, 200)
+        text = browser.until("texts.map(text => text[3]).find(text => text.endsWith(' N aerodynamic force'))")
+        keys.append(float(text.split()[0]))
+    assert 0.4 < keys[1] / keys[0] <= 1.0
 
 
 def test_the_page_follows_the_colour_scheme(page):

@@ -49,14 +49,10 @@ export function makeMotion(scene, times) {
   const centre = (now) => [0, 1, 2].map(
     (k) => now.reduce((sum, pose, b) => sum + pose.at[k] * scene.bodies[b].mass, 0) / total);
 
-  let largest = 0;
-  for (let i = 0; i < force.length; i += 3) {
-    const size = Math.hypot(force[i], force[i + 1], force[i + 2]);
-    if (size > largest && isFinite(size)) largest = size;
-  }
+  const { largest, beyond } = scaleOf(force, scene.bodies.length);
   let world = null;
   return {
-    scene, times, poses, centre, largest, ...blown,
+    scene, times, poses, centre, largest, beyond, ...blown,
     path: Array.from(times, (t) => centre(poses(t))),
     get world() { return (world ??= extents(scene, poses, centre, times)); },
   };
@@ -86,6 +82,23 @@ function makeAir(velocity, times) {
   }
 
   return { air, drift };
+}
+
+const OFTEN = 0.99; // share of the frames whose forces are no spike
+const SPIKE = 3; // times as large is one
+
+// The largest force for which arrows are long; whether there are larger ones, of a moment such as an impulsive start,
+// beside which nobody would see the others.
+function scaleOf(force, bodies) {
+  const most = new Float64Array(force.length / (3 * bodies));
+  for (let i = 0; i < force.length; i += 3) {
+    const size = Math.hypot(force[i], force[i + 1], force[i + 2]), frame = Math.floor(i / (3 * bodies));
+    if (size > most[frame] && isFinite(size)) most[frame] = size;
+  }
+  most.sort();
+  const top = most.at(-1) ?? 0, usual = most[Math.floor(OFTEN * (most.length - 1))] ?? 0;
+  const beyond = usual > 0 && top > SPIKE * usual;
+  return { largest: beyond ? usual : top, beyond };
 }
 
 // The middle of the mechanism and of points around it; how far they reach from there along the axes, and at all [m].

@@ -19,6 +19,7 @@ export function makePoses(scene) {
     get path() { return overview.path; },
     get world() { return overview.world; },
     get largest() { return overview.largest; },
+    get beyond() { return overview.beyond; },
     centre: overview.centre,
     poses: (t) => (at(t) ?? newest.at(-1) ?? overview).poses(t),
     air: (t) => (at(t) ?? newest.at(-1) ?? overview).air(t),

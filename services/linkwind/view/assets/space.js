@@ -114,7 +114,7 @@ export function makeSpace(host, motion, clock) {
   function arrows(now, metres) {
     const lines = [], heads = [], scale = motion.largest ? (ARROW * metres) / motion.largest : 0;
     for (const { at, force } of now) {
-      const size = length(force) * scale;
+      const size = Math.min(length(force) * scale, ARROW * metres);
       if (!(size > 0.002 * metres)) { heads.push(...Array(SIDES + 1).fill(at)); continue; }
       const along = force.map((x) => x / length(force)), tip = at.map((x, k) => x + size * along[k]);
       const height = Math.min(0.045 * metres, 0.6 * size);
@@ -216,7 +216,7 @@ export function makeSpace(host, motion, clock) {
   function words() {
     const wind = motion.air(clock.t), where = scene.air ? " at the bodies" : "", blows = isFinite(length(wind)) && (scene.air || length(wind));
     const text = blows ? [`wind${where} ${number(length(wind))} m/s along (${wind.map(number).join(", ")})`] : [];
-    if (motion.largest) text.push(`longest arrow ${number(motion.largest)} N`);
+    if (motion.largest) text.push(`longest arrow ${number(motion.largest)} N${motion.beyond ? " and more" : ""}`);
     return [{ text: text.join(" · "), x: 0.01, y: 0.99, xref: "paper", yref: "paper", xanchor: "left", yanchor: "top", showarrow: false }];
   }
 
