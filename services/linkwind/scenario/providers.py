@@ -145,7 +145,8 @@ class FlowModel(Section):
         json_schema_extra={"unit": "m"},
     )
     start_time: float | None = quantity(
-        "Time in which the wind comes up; default: what it takes along the longest body, 0 in still air",
+        "Time in which wind and speeds of the bodies at the start come up for the fluid; default: what the "
+        "wind takes along the longest body, 0 in still air",
         "s",
         None,
         ge=0.0,
