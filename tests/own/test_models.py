@@ -106,6 +106,41 @@ def test_the_motion_cannot_be_written_to():
     assert (evaluated(follower, motion).force == 7.0).all()
 
 
+def test_the_motion_of_some_bodies_cannot_be_written_to_either():
+    text = '[[providers]]\nname = "tail"\nmodel = "python"\nbodies = ["b"]\n'
+    bodies = "\n".join(f'[[bodies]]\nname = "{name}"\nmass = 1.0\ninertia = 1.0' for name in "ab")
+    model = built(
+        lambda t, motion, wrench: motion.linear.fill(0.0),
+        loads(f"[time]\nend = 1.0\n{bodies}\n{text}", "two"),
+    )
+    with pytest.raises(SimulationError, match="read-only"):
+        evaluated(model, moving())
+
+
+class Returns(linkwind.ForceModel):
+    def evaluate(self, t, motion, wrench):
+        return [1.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize("model", [lambda t, motion, wrench: -0.5 * motion.linear, Returns])
+def test_forces_that_are_returned_are_not_lost_in_silence(model):
+    with pytest.raises(
+        SimulationError, match=r"step 3 .*expected forces written into wrench; got (ndarray|list)"
+    ):
+        evaluated(built(model))
+    assert evaluated(built(lambda t, motion, wrench: wrench)).force.tolist() == [[0.0] * 3] * 2
+
+
+def test_a_function_of_the_wrong_arguments_is_told_which():
+    def two(t, motion):
+        """Forget the wrench."""
+
+    with pytest.raises(
+        InputError, match=r"expected a function of t, motion and wrench, .*two\(t, motion\), which"
+    ):
+        built(two)
+
+
 def test_an_exception_says_file_line_step_and_time():
     model = built(f"{models.__file__}:fails_later")
     evaluated(model, t=0.011)

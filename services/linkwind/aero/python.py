@@ -77,10 +77,16 @@ class PythonForces:
         for array in arrays:
             if array is not None:
                 array.fill(0.0)
+        call: Callable[[float, Motion, Wrench], object] = self._model.evaluate
         try:
-            self._model.evaluate(t, self._trial.of(motion), wrench)
+            returned = call(t, self._trial.of(motion), wrench)
         except (Exception, SystemExit) as error:
             raise self._failed(error, t) from error
+        if returned is not None and returned is not wrench:  # as of who thinks that this is where forces go
+            raise SimulationError(
+                f"{self._source}: {self._when(t)}: expected forces written into wrench; got "
+                f"{type(returned).__name__} returned. Write wrench.force[:] = …, and return nothing."
+            )
         for name, array in zip(_ARRAYS, arrays, strict=True):
             if getattr(wrench, name) is not array:
                 setattr(wrench, name, array)
@@ -162,8 +168,8 @@ class _Function(ForceModel):
         self._function, self._rows = function, rows
 
     def evaluate(self, t: float, motion: Motion, wrench: Wrench) -> None:
-        """Call it."""
-        self._function(t, motion if self._rows is None else _part(motion, self._rows), wrench)
+        """Call it; what it should not return is returned, so that its caller can tell."""
+        return self._function(t, motion if self._rows is None else _part(motion, self._rows), wrench)
 
 
 class _ReadOnly:
@@ -189,7 +195,7 @@ def _read_only(array: Array) -> Array:
 
 def _part(motion: Motion, rows: list[int]) -> Motion:
     parts = (motion.position, motion.orientation, motion.linear, motion.angular)
-    return Motion(*(part[rows] for part in parts))
+    return Motion(*(_read_only(part[rows]) for part in parts))
 
 
 def _made(source: PythonSource, scenario: Scenario, provider: Provider) -> ForceModel:
@@ -211,6 +217,12 @@ def _made(source: PythonSource, scenario: Scenario, provider: Provider) -> Force
     missing = [
         name for name in ("capabilities", "commit", "evaluate", "save", "restore") if not hasattr(model, name)
     ]
+    if missing and inspect.isfunction(own):
+        raise InputError(
+            f"{source}: expected a function of t, motion and wrench, or one of scenario and provider that "
+            f"returns a force model; got {source.name}{inspect.signature(own)}, which returned "
+            f"{type(model).__name__}. Correct it."
+        )
     if missing:
         raise InputError(
             f"{source}: expected a force model; got {type(model).__name__} without {', '.join(missing)}. "
