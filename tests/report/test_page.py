@@ -351,6 +351,21 @@ def test_bodies_without_a_shape_are_drawn_by_their_joints_or_their_radius_of_gyr
     np.testing.assert_allclose(np.linalg.norm(loose[0]["lines"][0]["points"], axis=1), 0.5)
 
 
+def test_a_body_without_a_shape_does_not_hide_those_that_have_one():
+    """The carriage of a foil of 1 m is drawn half as wide, whatever its inertia is."""
+    bodies = [
+        {"name": "link1", "mass": 2.0, "inertia": 50.0},
+        {
+            "name": "link2",
+            "mass": 2.0,
+            "inertia": 0.5,
+            "shape": {"type": "plate", "length": 1.0, "span": 9.0},
+        },
+    ]
+    carriage, _ = Page(render(planar(2, bodies=bodies, joints=[]))).data["scene"]["bodies"]
+    np.testing.assert_allclose(np.linalg.norm(carriage["lines"][0]["points"], axis=1), 0.25)
+
+
 def test_a_wing_is_drawn_as_its_planform_and_filled_where_it_is():
     """A dart: the triangle across its notch, of the corners 1, 2 and 3, is none of those that fill it."""
     wing = {"type": "wing", "points": [[1.0, 0.0], [2.0, 3.0], [1.0, 1.0], [0.0, 3.0]]}

@@ -96,7 +96,14 @@ def upwards(run: Run) -> tuple[float, float, float]:
 def outlines(run: Run, index: int) -> list[Line]:
     """Return what is drawn of a body: lines in its frame [m], each with whether it is closed."""
     body = run.scenario["bodies"][index]
-    return _lines(body, _joint_points(run, body["name"]), flat(run))
+    return _lines(body, _joint_points(run, body["name"]), _modest(run), flat(run))
+
+
+def _modest(run: Run) -> float:
+    """Return how large a body without a shape is drawn at most [m]: it shall not hide those that have one."""
+    shapes = (shape_of(body.get("shape")) for body in run.scenario["bodies"])
+    sizes = [max(shape.reference_length, 0.0 if flat(run) else shape.span) for shape in shapes if shape]
+    return 0.25 * max(sizes, default=np.inf)
 
 
 def _body(run: Run, index: int) -> dict[str, Any]:
@@ -153,7 +160,7 @@ def _joint_points(run: Run, name: str) -> Array:
     return np.array(points, dtype=float).reshape(-1, 3)
 
 
-def _lines(body: Mapping[str, Any], joint_points: Array, planar: bool) -> list[Line]:
+def _lines(body: Mapping[str, Any], joint_points: Array, modest: float, planar: bool) -> list[Line]:
     """Return what is drawn of a body: lines in its frame [m], shape (m, 3), each with whether it is closed.
 
     A plate is its rectangle, a wing its planform; another shape its outline, in 3-D both faces and four
@@ -164,7 +171,7 @@ def _lines(body: Mapping[str, Any], joint_points: Array, planar: bool) -> list[L
         return drawn
     shape = shape_of(body.get("shape"))
     if shape is None:
-        return [_without_shape(body, joint_points)]
+        return [_without_shape(body, joint_points, modest)]
     if isinstance(shape, Ellipsoid):
         return wires(drawings.Ellipsoid(type="ellipsoid", size=shape.size))
     if isinstance(shape, Wing):
@@ -179,10 +186,11 @@ def _lines(body: Mapping[str, Any], joint_points: Array, planar: bool) -> list[L
     return [(near, True), (far, True), *((np.stack([near[i], far[i]]), False) for i in edges)]
 
 
-def _without_shape(body: Mapping[str, Any], joint_points: Array) -> Line:
+def _without_shape(body: Mapping[str, Any], joint_points: Array, modest: float) -> Line:
     """Return a line through the joint points and the centre of mass.
 
-    Where these coincide it is a circle of the radius of gyration, or a point if a mesh pictures it.
+    Where these coincide it is a circle of the radius of gyration, of a modest one at most, or a point if a
+    mesh pictures it.
     """
     if joint_points.size and np.abs(joint_points).max() > 0.0:
         through = np.insert(joint_points, len(joint_points) // 2, 0.0, axis=0)
@@ -193,6 +201,6 @@ def _without_shape(body: Mapping[str, Any], joint_points: Array) -> Line:
         return np.zeros((1, 3)), False
     inertia = body["inertia"]
     about_z = inertia if isinstance(inertia, float | int) else max(inertia[:3])
-    radius = float(np.sqrt(about_z / max(body["mass"], 1e-12)))
+    radius = min(modest, float(np.sqrt(about_z / max(body["mass"], 1e-12))))
     angle = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
     return radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)]), True
