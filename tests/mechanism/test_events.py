@@ -105,3 +105,28 @@ def test_wrong_stops_get_their_line():
         LinkwindError, match=r'joints\[2\] "ac"\.stop: expected none, because ac \(distance\) has no'
     ):
         build(scenario(joints=[*HINGES[:2], HINGES[2] | {"stop": [0, 1]}]))
+
+
+@pytest.mark.parametrize(
+    ("stop", "angle", "refused"),
+    [
+        ([0.5, 1.5], 0.0, True),
+        ([0.5, 1.5], 57.2957795131, False),
+        ([-2.0, -0.5], 0.0, True),
+        ([0.0, 1.0], 0.0, False),
+        ([0.0, 1.0], 57.29577951308233, False),
+        ([3.0, 4.0], 200.0, False),
+        ([3.0, 4.0], -160.0, True),
+    ],
+)
+def test_a_joint_that_starts_beyond_a_stop_is_refused(stop, angle, refused):
+    """There it would stay for ever. Angles are as stated: -160° is not 200°, though it looks alike."""
+    bodies = [BODIES[0], BODIES[1] | {"angle_deg": angle}, BODIES[2] | {"angle_deg": 0.0}]
+    data = {"name": "case", "time": {"end": 1.0}, "bodies": bodies}
+    text = json.dumps(data | {"joints": [HINGES[0] | {"stop": stop}, HINGES[1]]})
+    if not refused:
+        build(from_json(text))
+        return
+    expected = r'joints\[0\] "ab".stop: expected the start between them, at .* rad; got'
+    with pytest.raises(LinkwindError, match=expected):
+        build(from_json(text))

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from linkwind.mechanism.assembly import assemble
-from linkwind.mechanism.events import happenings
+from linkwind.mechanism.events import check_stops, happenings
 from linkwind.mechanism.forces import inputs, prescribed, with_forces
 from linkwind.mechanism.start import WORLD_START, JointStart, Start, start
 from linkwind.mechanism.tables import padded, room, tables
@@ -84,6 +86,8 @@ def build(scenario: Scenario) -> Mechanism:
     if loops:
         moving = with_forces(flat, scenario, carried, q0, v0, motions=True)
         q0, v0 = assemble(scenario, moving, loops, q0, v0)
+    first = np.cumsum([0, *(NQ[kind] for kind in roomy)])  # of the coordinates of each joint
+    check_stops(scenario, dict(zip((each.name for each in carried), first.tolist(), strict=False)), q0)
     return Mechanism(
         bodies=tuple(body.name for body in scenario.bodies),
         joints=tuple(carrier.name for carrier in carried),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +12,9 @@ from linkwind.errors import MechanismError
 from linkwind.mechanism.tree import Carrier, Loop
 from linkwind.native.multibody import ACTIONS, OCCASIONS
 from linkwind.scenario import Scenario
+from linkwind.spatial import Array
+
+START = 1e-9  # rad or m by which a joint may start beyond a stop: round-off
 
 
 @dataclass(frozen=True)
@@ -63,6 +67,30 @@ def happenings(scenario: Scenario, carriers: list[Carrier], loops: list[Loop]) -
             name, e = f"{stated.name}.{end}", stated.restitution
             found.append(Happening(name, place[stated.name], "stop", "position", side, threshold, e))
     return found
+
+
+def check_stops(scenario: Scenario, place: Mapping[str, int], q0: Array) -> None:
+    """Find joints that start beyond a stop, where they would stay.
+
+    Args:
+        scenario: with the joints.
+        place: of the first coordinate of each joint, by its name.
+        q0: coordinates at the start [rad, m].
+
+    Raises:
+        MechanismError: one does.
+    """
+    for i, joint in enumerate(scenario.joints):
+        if joint.stop is None:
+            continue
+        (low, high), q = joint.stop, float(q0[place[joint.name]])
+        slack = START * max(1.0, abs(low), abs(high))
+        if not low - slack <= q <= high + slack:
+            unit = "rad" if joint.type == "revolute" else "m"
+            raise MechanismError(
+                f"{scenario.where('joints', i)}.stop: expected the start between them, at {q:.6g} {unit}; "
+                f"got {list(joint.stop)}. Correct them, or where {joint.child} starts."
+            )
 
 
 def event_tables(found: list[Happening]) -> dict[str, Any]:
