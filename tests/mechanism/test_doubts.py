@@ -1,4 +1,4 @@
-"""Motions that are perhaps not what was meant: those that everybody writes by mistake, and good ones."""
+"""What is perhaps not what was meant: what everybody writes by mistake, and what is good."""
 
 import pytest
 
@@ -49,6 +49,24 @@ def test_an_angle_that_looks_like_degrees(position, expected):
     assert bool(found) == (expected is not None), found
     assert expected is None or 'forces[0] "drive".position: it goes to' in found[0]
     assert expected is None or expected in found[0]
+
+
+@pytest.mark.parametrize(
+    ("mass", "inertia", "length", "told_of"),
+    [
+        (0.05, 0.05 * 0.2**2 / 12, 0.2, False),  # a rod
+        (0.05, 0.05 * 0.2**2 / 12, 200.0, True),  # in mm
+        (50.0, 0.05 * 0.2**2 / 12, 0.2, True),  # in g
+        (0.05, 50.0 * 200.0**2 / 12, 0.2, True),  # in g·mm²
+        (2.0, 1.4, 0.5, False),  # the paper's links
+    ],
+)
+def test_a_body_in_other_units(mass, inertia, length, told_of):
+    shape = f"{{ type = 'plate', length = {length} }}"
+    blade = {"mass": mass, "inertia": inertia, "shape": shape}
+    found = told(*(f"bodies.blade.{key}={value}" for key, value in blade.items()))
+    assert bool(found) == told_of, found
+    assert not told_of or 'rotor.toml: bodies[0] "blade".inertia: ' in found[0]
 
 
 def test_metres_are_not_taken_for_degrees():

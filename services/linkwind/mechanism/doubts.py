@@ -1,4 +1,4 @@
-"""What is not wrong in the motions of a scenario, but perhaps not what was meant: degrees, too long steps."""
+"""What is not wrong in a mechanism, but perhaps not what was meant: degrees, other units, too long steps."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from linkwind.scenario import Scenario
 from linkwind.scenario.forces import Motion
 from linkwind.spatial import Array
 
+SLIGHT, WIDE = 0.02, 10.0  # radius of gyration in lengths of a body: of a rod 0.29, of a disc 0.35
 LOOKS = 1000  # times at which a motion is looked at
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)  # its multiples, modulo 1, meet no rhythm
 STEPS_A_BEAT = 8.0  # that tell its shape, as of a gust
@@ -21,6 +22,7 @@ FEWEST = 16  # steps of a run in which there is a beat to see
 
 def doubts(scenario: Scenario) -> Iterator[str]:
     """Yield what to tell the user before a run, a sentence each; the mechanism has been built."""
+    yield from _other_units(scenario)
     revolute = {joint.name for joint in scenario.joints if joint.type == "revolute"}
     times = np.sort(np.arange(LOOKS) * GOLDEN % 1.0) * scenario.time.end
     for index, force in enumerate(scenario.forces):
@@ -35,6 +37,23 @@ def doubts(scenario: Scenario) -> Iterator[str]:
         if force.joint in revolute:
             yield from _in_degrees(item, q)
         yield from _too_long_steps(scenario, item, q, change)
+
+
+def _other_units(scenario: Scenario) -> Iterator[str]:
+    """A body's radius of gyration is a part of its length; in mm, g or g·mm² it is far from that."""
+    for index, body in enumerate(scenario.bodies):
+        if body.shape is None or body.mass == 0.0:
+            continue
+        flat = isinstance(body.inertia, float)
+        inertia = body.inertia if isinstance(body.inertia, float) else max(body.inertia[:3])
+        length = body.shape.reference_length if flat else max(body.shape.reference_length, body.shape.span)
+        radius = math.sqrt(inertia / body.mass)
+        if inertia and not SLIGHT * length < radius < WIDE * length:
+            yield (
+                f"{scenario.where('bodies', index)}.inertia: {inertia:.3g} kg·m² are {body.mass:.3g} kg "
+                f"{radius:.2g} m away from the centre of mass, of a body of {length:.3g} m. Are lengths in "
+                "m, masses in kg?"
+            )
 
 
 def _in_degrees(item: str, q: Array) -> Iterator[str]:
