@@ -69,6 +69,20 @@ def test_a_body_in_other_units(mass, inertia, length, told_of):
     assert not told_of or 'rotor.toml: bodies[0] "blade".inertia: ' in found[0]
 
 
+@pytest.mark.parametrize(("period", "told_of"), [(0.2, False), (20.0, False), (200.0, True)])
+def test_a_table_in_milliseconds(period, told_of):
+    rows = [[0.0, 0.0], [0.25 * period, 0.5], [0.75 * period, -0.5], [period, 0.0]]
+    found = told(f"forces.drive.position={{ table = {rows}, periodic = true }}")
+    assert bool(found) == told_of
+    assert not told_of or "position.table: it begins again after 200 s, and the run takes 2 s" in found[0]
+
+
+def test_the_angle_of_a_planar_joint_may_be_in_degrees():
+    plane = ("joints.hub.type=planar", 'forces.drive.position="30*sin(t*10)"')
+    assert told(*plane, "forces.drive.coordinate=0") == []
+    assert "If it is meant in degrees" in told(*plane, "forces.drive.coordinate=2")[0]
+
+
 def test_metres_are_not_taken_for_degrees():
     assert (
         told("joints.hub.type=prismatic", "joints.hub.axis=[1,0,0]", 'forces.drive.position="30*sin(t)"')

@@ -14,6 +14,8 @@ from linkwind.scenario.forces import Motion
 from linkwind.spatial import Array
 
 SLIGHT, WIDE = 0.02, 10.0  # radius of gyration in lengths of a body: of a rod 0.29, of a disc 0.35
+ANGLE = {"revolute": 0, "planar": 2}  # which coordinate of a joint is one
+LONG = 20.0  # runs that a beat takes: of milliseconds it would be hundreds
 LOOKS = 1000  # times at which a motion is looked at
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)  # its multiples, modulo 1, meet no rhythm
 STEPS_A_BEAT = 8.0  # that tell its shape, as of a gust
@@ -23,7 +25,7 @@ FEWEST = 16  # steps of a run in which there is a beat to see
 def doubts(scenario: Scenario) -> Iterator[str]:
     """Yield what to tell the user before a run, a sentence each; the mechanism has been built."""
     yield from _other_units(scenario)
-    revolute = {joint.name for joint in scenario.joints if joint.type == "revolute"}
+    angles = {(joint.name, ANGLE.get(joint.type)) for joint in scenario.joints}
     times = np.sort(np.arange(LOOKS) * GOLDEN % 1.0) * scenario.time.end
     for index, force in enumerate(scenario.forces):
         if not isinstance(force, Motion):
@@ -34,8 +36,9 @@ def doubts(scenario: Scenario) -> Iterator[str]:
         q, _, change = looks[np.isfinite(looks).all(axis=1)].T
         if not q.size:
             continue
-        if force.joint in revolute:
+        if (force.joint, force.coordinate) in angles:
             yield from _in_degrees(item, q)
+        yield from _in_milliseconds(scenario, item, force)
         yield from _too_long_steps(scenario, item, q, change)
 
 
@@ -65,6 +68,18 @@ def _in_degrees(item: str, q: Array) -> Iterator[str]:
         yield (
             f"{item}: it goes to and fro through {through:.3g} rad, {through / math.tau:.2g} turns. If it is "
             "meant in degrees, multiply it by pi/180."
+        )
+
+
+def _in_milliseconds(scenario: Scenario, item: str, motion: Motion) -> Iterator[str]:
+    table = motion.position.table
+    if table is None or not motion.position.periodic:
+        return
+    period, end = table[-1][0] - table[0][0], scenario.time.end
+    if period > LONG * end:
+        yield (
+            f"{item}.table: it begins again after {period:.4g} s, and the run takes {end:.4g} s. Are its "
+            "times in s?"
         )
 
 
