@@ -28,12 +28,12 @@ typedef struct { float u, q, uq, k2, m2, f, w; } axis;
 /* Raw moments of a plane after the collision, m22 less 1/9. */
 typedef struct { float m11, m21, m12, m22; } plane;
 
-/* With third central moments zero and K22 = rho/9 they follow from the second ones. */
-LW_INLINE plane in_plane(axis a, axis b, float k11, float density, int forced) {
-    const float third = 1.0f / 3.0f, ninth = 1.0f / 9.0f, twice = 2.0f * k11;
+/* With third central moments zero they follow from the second ones and K22 (less 1/9). */
+LW_INLINE plane in_plane(axis a, axis b, float k11, float k22, int forced) {
+    const float third = 1.0f / 3.0f, twice = 2.0f * k11;
     const float part = twice * b.u + a.u * b.k2;
     plane m = {.m11 = k11 + a.u * b.q, .m21 = twice * a.u + b.u * (third + a.m2), .m12 = part + a.u * b.uq};
-    m.m22 = ninth * density + b.u * m.m21 + a.u * part;
+    m.m22 = k22 + b.u * m.m21 + a.u * part;
     if (forced) {
         m.m11 += 0.5f * (a.u * b.f + b.u * a.f);
         m.m21 += 0.5f * b.f * (third + a.u * a.u) + b.u * a.w;
@@ -59,7 +59,9 @@ LW_INLINE axis an_axis(float momentum, float inverse, float force, int forced) {
 }
 
 /* Collide: the part of the second central moments without trace relaxes by `keep` = 1 - omega towards zero, their
- * trace and all higher ones are set to equilibrium. Momentum goes from j to j + F; q = j + F/2 = rho u. Of the raw
+ * trace and all higher ones are set to equilibrium, the fourth ones as they are with that part: less half of it along
+ * the third axis, for the populations of the second ones alone have that. At K22 = rho/9 noise grows in a fluid at
+ * rest, by 5e-3 a step. Momentum goes from j to j + F; q = j + F/2 = rho u. Of the raw
  * moments m_aa are kept less 1/3, m_aabb less 1/9: their values at rest. In each plane of two axes the algebra is
  * that of two dimensions. Terms in the force come last: without them the result has the bits of a force of zero. */
 LW_INLINE cell collide(cell f, float keep, vector force, int forced) {
@@ -91,13 +93,13 @@ LW_INLINE cell collide(cell f, float keep, vector force, int forced) {
         kyz += 0.5f * (y.u * z.f + z.u * y.f);
     }
     const float mean = third * ((kxx + kyy) + kzz);
-    const float dx = pressure + keep * (kxx - mean), dy = pressure + keep * (kyy - mean);
-    const float dz = pressure + keep * (kzz - mean);
+    const float sx = keep * (kxx - mean), sy = keep * (kyy - mean), sz = keep * (kzz - mean);
+    const float dx = pressure + sx, dy = pressure + sy, dz = pressure + sz, fourth = third * pressure;
     x.k2 = third + dx, y.k2 = third + dy, z.k2 = third + dz;
     x.m2 = dx + x.uq, y.m2 = dy + y.uq, z.m2 = dz + z.uq;
-    const plane m_xy = in_plane(x, y, keep * kxy, density, forced);
-    const plane m_xz = in_plane(x, z, keep * kxz, density, forced);
-    const plane m_yz = in_plane(y, z, keep * kyz, density, forced);
+    const plane m_xy = in_plane(x, y, keep * kxy, fourth - 0.5f * sz, forced);
+    const plane m_xz = in_plane(x, z, keep * kxz, fourth - 0.5f * sy, forced);
+    const plane m_yz = in_plane(y, z, keep * kyz, fourth - 0.5f * sx, forced);
     const float mxx = forced ? x.m2 + x.w : x.m2, myy = forced ? y.m2 + y.w : y.m2;
     const float mzz = forced ? z.m2 + z.w : z.m2;
     const float mx = forced ? jx + x.f : jx, my = forced ? jy + y.f : jy, mz = forced ? jz + z.f : jz;

@@ -37,7 +37,7 @@ static moments of_cell(const float *f, int64_t volume) {
     return m;
 }
 
-/* Populations whose third and fourth central moments are at equilibrium. Raw moments less what they are at
+/* Populations whose third and fourth central moments are as the collision leaves them. Raw moments less what they are at
  * rest (1, 1/3, 1/9), so that a fluid at rest is exactly zero. */
 static void to_cell(float *f, int64_t volume, const moments *m) {
     const double mass = 1.0 + m->density, pressure = m->density / 3.0;
@@ -53,7 +53,8 @@ static void to_cell(float *f, int64_t volume, const moments *m) {
         const double ux = m->u[a], uy = m->u[b], m11 = m->shear[p] + mass * ux * uy;
         const double m21 = uy * (1.0 / 3.0 + m2[a]) + 2.0 * ux * m->shear[p];
         const double m12 = ux * (1.0 / 3.0 + m2[b]) + 2.0 * uy * m->shear[p];
-        const double m22 = m->density / 9.0 + uy * m21 + ux * (m12 - mass * ux * uy * uy);
+        const double k22 = m->density / 9.0 - 0.5 * m->along[3 - a - b];
+        const double m22 = k22 + uy * m21 + ux * (m12 - mass * ux * uy * uy);
         float *of = f + (7 + 4 * p) * volume;
         of[0] = (float)(0.25 * (m22 + m11 + m21 + m12));
         of[volume] = (float)(0.25 * (m22 + m11 - m21 - m12));

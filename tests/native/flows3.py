@@ -100,7 +100,8 @@ def one_step(populations, omega, force):
     Moments are taken with the 19 x 19 matrix of Π (c_a - u_a)^n, relaxed, and taken back with its inverse:
     K' = K + Λ(K_eq - K) + (1 - Λ/2) S, Λ = ω for second moments less their trace, 0 for mass and momentum,
     1 for the rest; S = F for momentum, F_b / 3 for the moment of a² b, else 0. K_eq are those of a Gauss
-    distribution of variance 1/3 as far as the 19 reach.
+    distribution of variance 1/3 as far as the 19 reach, but that of a² b² is less half of what is left off it
+    along the third axis.
     """
     f = populations.astype(float) + WEIGHTS[:, None, None, None]
     f = np.array([np.roll(f[q], C[q], (2, 1, 0)) for q in range(19)])
@@ -124,6 +125,7 @@ def one_step(populations, omega, force):
         elif order == 3:
             after[m] = force[n.index(1)] / 6
         else:
-            after[m] = density / 9
+            left = after[4 + n.index(0)] - density / 3
+            after[m] = density / 9 - left / 2
     out = np.linalg.solve(np.moveaxis(basis, (0, 1), (-2, -1)), np.moveaxis(after, 0, -1)[..., None])
     return np.moveaxis(out[..., 0], -1, 0) - WEIGHTS[:, None, None, None]

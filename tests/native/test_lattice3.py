@@ -258,6 +258,21 @@ def test_taylor_green_vortices_at_a_high_reynolds_number_stay_finite_and_lose_en
     assert energy[-1] < 0.7 * energy[0]
 
 
+@pytest.mark.parametrize("viscosity", [1e-2, 1e-3, 1e-5])
+def test_noise_in_a_fluid_at_rest_dies_away(viscosity):
+    """Nothing feeds it, whatever its waves are, down to those of two cells."""
+    period = 32
+    lattice = Lattice3(*[period + 2] * 3, shear_rate=shear_rate(viscosity), fringe=1, threads=2)
+    lattice.populations[:] = rng().normal(scale=1e-5, size=lattice.populations.shape)
+    energy = []
+    for k in range(1501):
+        if k % 500 == 1:
+            energy.append((lattice.moments().velocity[INSIDE].astype(float) ** 2).sum())
+        wrap(lattice)
+        lattice.step()
+    assert (np.diff(energy) < 0).all()
+
+
 @pytest.mark.parametrize("viscosity", [0.004, 0.4])
 @pytest.mark.parametrize("name", ["y along x", "oblique in a plane"])
 def test_half_the_step_keeps_flow_and_decay_in_physical_time(viscosity, name):

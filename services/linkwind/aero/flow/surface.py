@@ -33,7 +33,7 @@ from linkwind.spatial import Array, rotations, turned
 # oscillates, for 1e-3 to 0.1 cells² a step, and the drag of a plate across a stream at Re 100, which is the
 # same with 8 to 28 cells along its chord.
 EDGE_INSET = (0.85, 0.05, 0.38, 2.4)
-CLOSED_INSET = (0.49, 0.145, 0.25, 1.22)
+CLOSED_INSET = (0.5, 0.2, 0.2, 1.13)
 FROM_RIM = 0.85 * SPACING  # cells, at least, from the rim of a flat end to the grid in it
 
 _Surface = tuple[Array, Indices]  # markers in the body frame [cells], (k, 3), and the patches, (m, 4)
