@@ -13,6 +13,7 @@ from linkwind.errors import InputError
 from linkwind.runs.validate import COUPLING, FLOW, MULTIBODY, VORTEX, page
 from linkwind.runs.validate.multibody import elliptic
 from linkwind.runs.validate.rows import Findings, Row, most, near
+from linkwind.runs.validate.space import wing
 from linkwind.runs.validate.vortex import exact, flutter, surface
 
 
@@ -161,3 +162,11 @@ def test_a_section_in_little_fluid_swings_as_in_the_void():
     frequencies = np.sqrt(np.linalg.eigvals(np.linalg.solve(heavy.inertia, np.diag(heavy.springs))))
     for frequency in frequencies.tolist():
         assert heavy.rate(1.0, 1j * frequency) == pytest.approx(1j * frequency, abs=1e-4)
+
+
+def test_the_long_cylinder_is_as_hard_to_turn_as_its_fluid():
+    """Else the model refuses it in its first step: at the whole case nobody looks often."""
+    _, shape, angle = wing.LONG[1]
+    t, force = wing._in_space(shape, angle, 8, (6.0, 6.0, 9.0), wing.SPANS[0])
+    assert np.isfinite(force).all()
+    assert force[t > 3.0, 0].mean() > 0.5 * 5.0  # ½ρU² on its front is half a newton a metre

@@ -119,11 +119,11 @@ def _in_space(
     shape: str, angle: float, cells: int, window: tuple[float, float, float], span: float
 ) -> tuple[Array, Array]:
     """Return times and force (steps, 2) on a body of a span in a stream that comes up in a second."""
-    step = round(SPEED / cells, 9)
+    step, inertia = round(SPEED / cells, 9), [span**3] * 3 + [0.0] * 3  # more than that of the fluid inside
     text = scene(
         f"{{ {shape}, span = {span!r} }}", span * cells, step, 0.01, window, wind=(1.0, 0.0, 0.0),
         start_time=1.0,
-        body=f"mass = {2.0 * span!r}\ninertia = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]",
+        body=f"mass = {2.0 * span!r}\ninertia = {inertia!r}",
     )  # fmt: skip
     t, wrench = driven(text, still(0.0, 0.0, -angle), round(4.0 / step))
     return t, wrench[:, :2]
