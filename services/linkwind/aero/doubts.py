@@ -133,7 +133,7 @@ def _few_cells(scenario: Scenario, provider: Provider) -> Iterator[str]:
         yield (
             f'{item(scenario, provider, "flow", "cells")}: the mean width of "{name}" has '
             f"{sides[name]:.3g} cells, and with less than {FEW:g} forces are far off: with 8 along their "
-            "chord a fruit fly's wings lift 0.7 of what they lift with 15. Use at least "
+            "chord a fruit fly's wings lift 0.75 of what they lift with 15. Use at least "
             f"{math.ceil(FEW / sides[name] * provider.flow.cells - 1e-9)}."
         )
 
