@@ -188,13 +188,15 @@ def table(log: Log | str | Path, name: str = "trajectory") -> dict[str, NDArray[
     return export.table(opened, name, labels_of(opened))
 
 
-def means(log: Log | str | Path, begin: float, end: float, name: str = "trajectory") -> dict[str, float]:
+def means(
+    log: Log | str | Path, begin: float | None = None, end: float | None = None, name: str = "trajectory"
+) -> dict[str, float]:
     """Return the mean of each column of a table over a range of time, as ``linkwind log means``.
 
     Args:
         log: of a run: open, its file, or the run's folder.
-        begin: of the range [s].
-        end: of the range [s]; a whole number of beats later, say.
+        begin: of the range [s]; None for that of the log.
+        end: of the range [s], a whole number of beats later, say; None for that of the log.
         name: of the table, see :func:`table`.
 
     Returns:

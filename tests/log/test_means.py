@@ -29,6 +29,12 @@ def test_ends_between_rows_are_met(begin, end):
     assert found["v"] == pytest.approx(5.0 - 4.0 * (begin + end), abs=1e-12)
 
 
+def test_without_a_range_it_is_that_of_the_table():
+    columns = {"t [s]": T, "a": 3.0 * T**2}
+    assert means(columns, None, None, "log") == means(columns, 0.0, 1.0, "log")
+    assert means(columns, 0.4, None, "log") == means(columns, 0.4, 1.0, "log")
+
+
 def test_a_value_that_is_missing_makes_no_number():
     values = np.where(T == 0.5, np.nan, 1.0)
     assert np.isnan(means({"t [s]": T, "a": values}, 0.4, 0.6, "log")["a"])

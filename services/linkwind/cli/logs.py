@@ -120,8 +120,12 @@ def export(
 
 def means(
     log: LogArgument,
-    begin: Annotated[float, typer.Option("--from", help="Begin of the range of time [s].")],
-    end: Annotated[float, typer.Option("--to", help="End of the range of time [s].")],
+    begin: Annotated[
+        float | None, typer.Option("--from", help="Begin of the range of time [s]; default: of the log.")
+    ] = None,
+    end: Annotated[
+        float | None, typer.Option("--to", help="End of the range of time [s]; default: of the log.")
+    ] = None,
     name: Annotated[
         str, typer.Option("--table", help="trajectory, steps or wrench_PROVIDER.")
     ] = "trajectory",

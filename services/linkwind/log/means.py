@@ -14,13 +14,15 @@ _TIME = "t [s]"
 _ROWS = ("step", _TIME, "iteration")  # what they are, of which a mean says nothing
 
 
-def means(columns: Mapping[str, NDArray[Any]], begin: float, end: float, where: str) -> dict[str, float]:
+def means(
+    columns: Mapping[str, NDArray[Any]], begin: float | None, end: float | None, where: str
+) -> dict[str, float]:
     """Return the mean of each column by the trapezoidal rule; at the ends of the range by straight lines.
 
     Args:
         columns: of a table, with ``t [s]``, each of shape (rows,).
-        begin: of the range [s].
-        end: of the range [s].
+        begin: of the range [s]; None for that of the table.
+        end: of the range [s]; None for that of the table.
         where: file of the table, for the error.
 
     Returns:
@@ -30,6 +32,8 @@ def means(columns: Mapping[str, NDArray[Any]], begin: float, end: float, where: 
         InputError: the range is none, or reaches beyond the table.
     """
     t = columns[_TIME]
+    begin = float(t[0]) if begin is None else begin
+    end = float(t[-1]) if end is None else end
     slack = 1e-9 * max(abs(t[0]), abs(t[-1]))  # of a sum of steps
     if not (t[0] - slack <= begin < end <= t[-1] + slack):
         raise InputError(
