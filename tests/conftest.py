@@ -1,5 +1,7 @@
 """What newcomers need not wait for: `pytest -m slow` runs it, and CI does."""
 
+import os
+
 import pytest
 from hypothesis import settings
 
@@ -88,3 +90,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.nodeid.startswith(SLOW):
             item.add_marker("slow")
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """Return one more than there are cores: tests of processes wait a quarter of their time."""
+    return len(os.sched_getaffinity(0)) + 1
