@@ -262,6 +262,14 @@ def test_a_wind_that_changes_is_shown_as_it_is_at_the_bodies():
     assert (steady["wind"], steady["air"]) == ([-5.0, 0.0, 0.0], None)
 
 
+def test_a_wind_has_the_inputs_of_the_scenario():
+    run = planar(20)
+    wind = {"wind": [{"expression": "-2*u"}, 0.0, 0.0], "inputs": {"u": 1.5}}
+    scenario = run.scenario | {"environment": run.scenario["environment"] | wind}
+    scene = Page(render(dataclasses.replace(run, scenario=scenario))).data["scene"]
+    assert scene["wind"] == [-3.0, 0.0, 0.0]
+
+
 def test_a_wind_that_cannot_be_read_is_not_shown():
     run = planar(20)
     environment = run.scenario["environment"] | {"wind": [{"expression": HOSTILE}, 0.0, 0.0]}

@@ -150,9 +150,8 @@ def _of_rings(scenario: Scenario, provider: Provider) -> Iterator[str]:
     pairs = zip(at_start(scenario), scenario.bodies, strict=True)
     speeds = [math.dist(air, body.velocity or (0.0, 0.0, 0.0)) for air, body in pairs]
     chord = min(map(mean_chord, thin(scenario, provider)))
-    far = (
-        max(filter(math.isfinite, speeds), default=0.0) * scenario.coupling.step / chord
-    )  # chords in a step, at the start
+    fastest = max(filter(math.isfinite, speeds), default=0.0)
+    far = fastest * scenario.coupling.step / chord  # chords in a step, at the start
     if far * settings.chordwise > COARSE:
         yield (
             f"{scenario.source}: coupling.step: at the start the air passes {far * settings.chordwise:.2g} "

@@ -57,7 +57,8 @@ def _air(run: Run, t: Array, position: Array) -> Array | None:
         t: times [s], shape (k,).
         position: of the bodies [m], shape (k, n, 3).
     """
-    stated = {key: run.scenario["environment"][key] for key in ("wind", "gusts")}
+    environment = run.scenario["environment"]
+    stated = {key: environment[key] for key in ("wind", "inputs", "gusts") if key in environment}
     if not stated["gusts"] and not any(isinstance(component, Mapping) for component in stated["wind"]):
         return None
     mass = np.array([max(body["mass"], 1e-12) for body in run.scenario["bodies"]])[:, None]
